@@ -1,0 +1,2 @@
+//! Numbers that know nothing of light: frames, colours, warps beside their densities, distributions, statistics.
+
