@@ -1,6 +1,16 @@
 //! Isophote: a research framework for Metropolis photon tracing.
 //!
-//! Rooms, from the ground up: [`math`], [`scene`]; each imports only from those below its own (`docs/architecture.md`).
+//! Rooms, from the ground up: [`math`], [`image`], [`scene`], [`transport`], [`photons`], [`targets`], [`integrators`],
+//! [`render`], [`cli`]; each imports only from those below its own (`docs/architecture.md`).
 
+pub mod cli;
+pub mod image;
+pub mod integrators;
 pub mod math;
+pub mod photons;
+pub mod render;
 pub mod scene;
+pub mod targets;
+pub mod transport;
+
+pub use isophote_samplers as samplers;

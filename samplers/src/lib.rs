@@ -1,1 +1,7 @@
-//! x
+//! Light-path samplers over primary sample space. This crate knows numbers in [0, 1): no scene, no ray, no image.
+//!
+//! A light path is a function of a [`Stream`]. The same function serves independent numbers, a Markov chain or a replay.
+
+pub mod stream;
+
+pub use stream::{Key, Purpose, Replay, Stream, UniformStream};

@@ -1,0 +1,3 @@
+//! Images: the film's sums and counts, EXR files with metadata, metrics, tone mapping.
+
+pub mod film;

@@ -1,0 +1,135 @@
+//! Methods, one file each, and the one table that names them.
+//!
+//! A method is prepared once and then iterated; it knows no loop, no clock and no file (`render` does).
+
+use crate::image::film::Film;
+use crate::scene::Scene;
+use clap::{ArgMatches, Args, Command, FromArgMatches};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+
+/// What every method is told beside its own settings.
+#[derive(Clone, Debug)]
+pub struct Common {
+    /// Seed of every stream.
+    pub seed: u64,
+    /// Most path edges: 1 is emitters seen directly, 2 direct light; `None` is unlimited.
+    pub max_depth: Option<u32>,
+    /// Fewest path edges that count.
+    pub min_depth: u32,
+    /// Russian roulette starts at this many edges, where the method's roulette has a start.
+    pub rr_depth: u32,
+    /// Emitters do not show when seen directly (depth 1).
+    pub hide_emitters: bool,
+    /// Only paths whose class matches count (Heckbert letters from the light).
+    pub paths: Option<regex::Regex>,
+}
+
+/// What an iteration did. Counts add over iterations.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct IterationStats {
+    /// Camera subpaths started.
+    pub camera_paths: u64,
+    /// Light subpaths started, burn-in and start-up counted.
+    pub light_paths: u64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Samples that gave no usable number, by cause. Never silently dropped.
+    pub rejected: BTreeMap<&'static str, u64>,
+}
+
+impl IterationStats {
+    /// Adds another's counts.
+    pub fn add(&mut self, other: &IterationStats) {
+        self.camera_paths += other.camera_paths;
+        self.light_paths += other.light_paths;
+        self.rays += other.rays;
+        for (cause, count) in &other.rejected {
+            *self.rejected.entry(cause).or_default() += count;
+        }
+    }
+}
+
+/// A method bound to a scene, a film size and settings.
+pub trait Integrator: Send {
+    /// Work before the first iteration (a pilot, a radius); counted as render time.
+    fn prepare(&mut self) -> Result<IterationStats, MethodError>;
+    /// Adds iteration `i` to the film. For a stateless method the result depends on (scene, settings, seed, `i`) only.
+    fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats;
+    /// The merge radius of the first iteration in world units, where there is one radius for all vertices; for the metadata.
+    fn radius(&self) -> Option<f64> {
+        None
+    }
+    /// Iterations may be rendered in any order and in disjoint ranges.
+    fn stateless(&self) -> bool {
+        true
+    }
+}
+
+/// A method refuses its settings or its scene.
+#[derive(Debug, thiserror::Error)]
+pub enum MethodError {
+    /// Settings that contradict each other or the scene; the message says what to change.
+    #[error("{method}: {message}")]
+    Settings {
+        /// The method's name.
+        method: &'static str,
+        /// What is wrong and what to do.
+        message: String,
+    },
+}
+
+/// One set of settings serves the command line, study files and metadata.
+pub trait Settings: Args + Serialize + DeserializeOwned + Clone + Send + Sync + 'static {
+    /// Binds the method to a scene. `size` is the film's width and height in pixels.
+    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError>;
+}
+
+/// [`Settings`] behind a table.
+pub trait BoxedSettings: Send + Sync {
+    /// See [`Settings::build`].
+    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError>;
+    /// As it stands in the metadata: keys are the long option names with dashes as underscores.
+    fn to_json(&self) -> serde_json::Value;
+}
+
+impl<S: Settings> BoxedSettings for S {
+    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
+        Settings::build(self, scene, size, common)
+    }
+    fn to_json(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or(serde_json::Value::Null)
+    }
+}
+
+/// A line of the table of methods.
+pub struct Method {
+    /// Name on the command line and in files.
+    pub name: &'static str,
+    /// One sentence.
+    pub about: &'static str,
+    /// Its page under `docs/`.
+    pub page: &'static str,
+    /// Adds the method's options to a command.
+    pub augment: fn(Command) -> Command,
+    /// Reads them back.
+    pub from_matches: fn(&ArgMatches) -> Result<Box<dyn BoxedSettings>, clap::Error>,
+    /// Reads them from a study file or from metadata; missing keys take their defaults.
+    pub from_json: fn(&serde_json::Value) -> Result<Box<dyn BoxedSettings>, serde_json::Error>,
+}
+
+/// Fills a line of the table from a settings type.
+pub const fn method<S: Settings>(name: &'static str, about: &'static str, page: &'static str) -> Method {
+    Method {
+        name,
+        about,
+        page,
+        augment: |command| S::augment_args(command),
+        from_matches: |matches| Ok(Box::new(S::from_arg_matches(matches)?)),
+        from_json: |value| Ok(Box::new(serde_json::from_value::<S>(value.clone())?)),
+    }
+}
+
+/// Every method. The command line, `list`, studies, smoke tests and the documentation check walk this slice.
+pub const METHODS: &[Method] = &[];

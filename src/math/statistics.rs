@@ -1,0 +1,1 @@
+//! Hypothesis tests and summaries shared by tests, `compare` and `study`, on `statrs`.

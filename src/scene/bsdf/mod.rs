@@ -1,0 +1,134 @@
+//! Materials. A bidirectional scattering distribution function is a value, a density and a way to sample it.
+//!
+//! **Directions** are unit vectors in the shading frame (z along the shading normal) and both point away from the surface.
+//! `wi` points towards the light and `wo` towards the eye, whichever of the two a walk came from; a function that does not care
+//! about light and eye speaks of `given` (where the walk came from) and `sampled` (where it goes).
+//!
+//! **Values** are `f(wi -> wo)` for radiance, without a cosine: refraction carries its `(eta_i/eta_t)^2` by the roles of the two
+//! directions, so light-side walks need no other function ([VEACH 5.2]), only the adjoint factor for shading normals
+//! (`transport`). Delta lobes have no value and no density: they exist in [`Bsdf::sample`] alone.
+
+use crate::math::Rgb;
+use glam::{Vec2, Vec3};
+
+/// What is carried along a walk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The walk started at the camera: `given` is `wo`, `sampled` is `wi`.
+    Radiance,
+    /// The walk started at a light: `given` is `wi`, `sampled` is `wo`.
+    Importance,
+}
+
+impl Mode {
+    /// `(wi, wo)` of a walk's `(given, sampled)`.
+    #[inline(always)]
+    pub fn roles(self, given: Vec3, sampled: Vec3) -> (Vec3, Vec3) {
+        match self {
+            Mode::Radiance => (sampled, given),
+            Mode::Importance => (given, sampled),
+        }
+    }
+}
+
+/// Which lobes of a material take part, by roughness: diffuse 1, microfacet `sqrt(alpha_u alpha_v)`, Phong `sqrt(2/(n+2))`, delta 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lobes {
+    /// Every lobe.
+    All,
+    /// Lobes that are not deltas and whose roughness is at least this.
+    Rough(f32),
+    /// What [`Lobes::Rough`] with the same number leaves: rougher lobes are out, deltas are in.
+    Smooth(f32),
+}
+
+impl Lobes {
+    /// Does a lobe of this roughness take part? `0` means a delta.
+    #[inline(always)]
+    pub fn admit(self, roughness: f32) -> bool {
+        match self {
+            Lobes::All => true,
+            Lobes::Rough(threshold) => roughness > 0.0 && roughness >= threshold,
+            Lobes::Smooth(threshold) => roughness <= 0.0 || roughness < threshold,
+        }
+    }
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// The sampled direction.
+    pub w: Vec3,
+    /// `f |cos(w)| / pdf_fwd`, in the mode asked for, over the lobes asked for; finite and not negative.
+    pub weight: Rgb,
+    /// Density of `w` given the other direction, over the lobes asked for: per steradian, or for a delta lobe its probability.
+    pub pdf_fwd: f32,
+    /// The same with the roles exchanged: density of the given direction, had the walk come from `w`.
+    pub pdf_rev: f32,
+    /// The direction comes from a delta lobe.
+    pub delta: bool,
+    /// Roughness of the lobe sampled, see [`Lobes`].
+    pub roughness: f32,
+    /// Index of refraction on the sampled side over that on the given side; 1 for reflection and null transmission.
+    pub eta: f32,
+}
+
+/// Every material. Adding one touches its own file, this list and one line of the loader's table.
+#[derive(Clone, Debug)]
+pub enum Bsdf {
+    /// Lambertian reflection from the front.
+    Diffuse(diffuse::Diffuse),
+}
+
+impl Bsdf {
+    /// `f(wi -> wo)` for radiance, without cosine, over the non-delta lobes among `lobes`.
+    pub fn eval(&self, uv: Vec2, wi: Vec3, wo: Vec3, lobes: Lobes) -> Rgb {
+        match self {
+            Bsdf::Diffuse(b) => b.eval(uv, wi, wo, lobes),
+        }
+    }
+
+    /// Density per steradian of `sampled` given `given`, over the non-delta lobes among `lobes`; includes the probability of choosing
+    /// a non-delta lobe, so it integrates to at most 1.
+    pub fn pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
+        match self {
+            Bsdf::Diffuse(b) => b.pdf(uv, given, sampled, lobes),
+        }
+    }
+
+    /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, for a walk in `mode`: what next event estimation asks.
+    pub fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        let (wi, wo) = mode.roles(given, sampled);
+        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+    }
+
+    /// A direction drawn from the lobes asked for, deltas included; `None` where the walk ends (absorbed, or below the surface).
+    /// `u_lobe` chooses the lobe, `u` the direction; each coordinate is in [0, 1).
+    pub fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Diffuse(b) => b.sample(uv, given, mode, lobes, u_lobe, u),
+        }
+    }
+
+    /// The share of light from `given` that the lobes asked for scatter on (mean over colour, in [0, 1]), exact or approximate: for
+    /// choices only, which are divided by it. Zero only where [`Bsdf::sample`] always answers `None`.
+    pub fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
+        match self {
+            Bsdf::Diffuse(b) => b.albedo(uv, given, lobes),
+        }
+    }
+
+    /// Roughness of the roughest lobe there is anywhere on the surface; 0 if all are deltas.
+    pub fn max_roughness(&self) -> f32 {
+        match self {
+            Bsdf::Diffuse(_) => 1.0,
+        }
+    }
+
+    /// Is any lobe anisotropic, so that the frame's tangent must follow `dp/du`?
+    pub fn anisotropic(&self) -> bool {
+        false
+    }
+}
+
+pub mod diffuse;

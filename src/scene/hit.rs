@@ -1,0 +1,81 @@
+//! Points on surfaces, and rays that start and end there without meeting the surface itself.
+
+use super::ray::Ray;
+use super::{EmitterId, ShapeId};
+use crate::math::Frame;
+use glam::{Vec2, Vec3};
+
+/// A point that a ray may start from or end at, with what is known of its rounding error.
+#[derive(Clone, Copy, Debug)]
+pub struct Endpoint {
+    /// Position, world units.
+    pub p: Vec3,
+    /// Unit geometric normal; zero for a point in free space.
+    pub n_g: Vec3,
+    /// How far `p` may lie off its surface along `n_g`, world units: a bound on rounding error, not a tuning constant.
+    pub offset: f32,
+}
+
+impl Endpoint {
+    /// A point in free space: a camera, a point light.
+    pub fn free(p: Vec3) -> Self {
+        Self { p, n_g: Vec3::ZERO, offset: 0.0 }
+    }
+
+    /// The position moved off its surface to the side that `d` points to.
+    #[inline]
+    pub fn toward(&self, d: Vec3) -> Vec3 {
+        let side = self.offset.copysign(d.dot(self.n_g));
+        let moved = self.p + self.n_g * side;
+        // Rounding the sum must not undo the offset: step to the next number away from the surface ([PBRT 6.8.6]).
+        let away = self.n_g * side;
+        let step = |o: f32, a: f32| {
+            if a > 0.0 {
+                o.next_up()
+            } else if a < 0.0 {
+                o.next_down()
+            } else {
+                o
+            }
+        };
+        Vec3::new(step(moved.x, away.x), step(moved.y, away.y), step(moved.z, away.z))
+    }
+
+    /// The endless ray that leaves along `d`.
+    #[inline]
+    pub fn ray(&self, d: Vec3) -> Ray {
+        Ray::new(self.toward(d), d)
+    }
+
+    /// The ray that ends just before `other`; its direction has the length of the segment.
+    #[inline]
+    pub fn segment(&self, other: &Endpoint) -> Ray {
+        let o = self.toward(other.p - self.p);
+        let end = other.toward(self.p - other.p);
+        Ray { o, d: end - o, t_max: SEGMENT_END }
+    }
+}
+
+/// Segments stop this short of their end, relative to their length: the far end's own rounding error is covered by its offset,
+/// the error of the intersection's `t` by this.
+const SEGMENT_END: f32 = 1.0 - 1e-4;
+
+/// A ray's meeting with a surface, worked out.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Ray parameter.
+    pub t: f32,
+    /// Position, geometric normal and error bound.
+    pub end: Endpoint,
+    /// Shading frame; `frame.n` is the shading normal and may lie on the other side of `end.n_g` than a given direction.
+    /// `frame.s` follows the surface's `dp/du` where a material of the shape is anisotropic, else it is any tangent.
+    pub frame: Frame,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// The primitive hit, as the accelerator counts them.
+    pub prim: u32,
+    /// The shape hit.
+    pub shape: ShapeId,
+    /// The emitter of the shape, if it has one.
+    pub emitter: Option<EmitterId>,
+}

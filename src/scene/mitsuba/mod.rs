@@ -1,0 +1,1 @@
+//! Mitsuba 3 XML to a scene.
