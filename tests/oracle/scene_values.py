@@ -9,9 +9,9 @@ camera: `film` is [x, y] in pixels of the full film (pixel i spans [i, i+1)), al
 emitter: `shade` entries: from the point `p` (with normal `n`) the random pair `u` gave direction `d`, distance `dist`,
         density `pdf` (solid angle; 0 with `delta`), `weight` = radiance / pdf (for delta lights the incident
         irradiance at normal incidence). `toward` entries: radiance `value` seen along `d` from `p`, and the density
-        `pdf` with which the emitter would have chosen that direction. `emit` entries: a light ray from the pairs
+        `pdf` with which the emitter would have chosen that direction. `falloff` (spots): intensity at an angle (degrees) off the axis. `emit` entries: a light ray from the pairs
         `u2`, `u3` with `weight` = power carried by one such ray.
-texture: `value` (RGB) at `uv`.
+texture: `value` (RGB) and `scalar` (what a mask's opacity or a blend's weight sees) at `uv`.
 shape: rays `o`, `d` (the direction's length is kept as 1) with the first hit: `t`, `p`, geometric `n`, shading `sh_n`, `uv`,
         `dp_du`, `dp_dv`; `area` is the shape's.
 """
@@ -112,7 +112,7 @@ def cameras():
 
 
 FLOOR = '<shape type="rectangle"><transform name="to_world"><scale value="3"/></transform></shape>'
-ROT = '<transform name="to_world"><rotate x="1" y="0.5" z="-0.2" angle="50"/></transform>'
+ROT = '<transform name="to_world"><rotate x="0.6" y="0.8" z="0" angle="50"/></transform>'
 AREA = '<emitter type="area"><rgb name="radiance" value="1 2 3"/></emitter>'
 AREA_TEX = '<emitter type="area"><texture type="bitmap" name="radiance"><string name="filename" value="data/texture.exr"/><boolean name="raw" value="true"/></texture></emitter>'
 PLACE = '<transform name="to_world"><scale value="0.5"/><rotate x="1" angle="150"/><translate x="0.3" y="0.2" z="3"/></transform>'
@@ -159,7 +159,7 @@ def textures():
 
 
 def shapes():
-    turn = '<transform name="to_world"><scale value="0.7"/><rotate x="1" y="2" z="0.5" angle="40"/><translate x="0.2" y="-0.1" z="0.3"/></transform>'
+    turn = '<transform name="to_world"><scale value="0.7"/><rotate x="0.48" y="-0.6" z="0.64" angle="40"/><translate x="0.2" y="-0.1" z="0.3"/></transform>'
     uneven = '<transform name="to_world"><scale x="0.5" y="0.8" z="1.2"/><rotate y="1" angle="40"/></transform>'
     mirror = '<transform name="to_world"><scale x="-1" y="1" z="1"/></transform>'
     flip = '<boolean name="flip_normals" value="true"/>'
@@ -168,7 +168,8 @@ def shapes():
         yield f"{kind}-turned", f'<shape type="{kind}">{turn}</shape>'
         yield f"{kind}-flip_normals", f'<shape type="{kind}">{turn}{flip}</shape>'
         yield f"{kind}-mirrored", f'<shape type="{kind}">{mirror}</shape>'
-        yield f"{kind}-uneven", f'<shape type="{kind}">{uneven}</shape>'
+        if kind not in ("sphere", "cylinder"):  # Mitsuba warns there, and takes one axis for the radius
+            yield f"{kind}-uneven", f'<shape type="{kind}">{uneven}</shape>'
     yield "sphere-centre", '<shape type="sphere"><point name="center" x="0.2" y="-0.3" z="0.1"/><float name="radius" value="0.6"/></shape>'
     yield "sphere-centre-turned", f'<shape type="sphere"><point name="center" x="0.2" y="-0.3" z="0.1"/><float name="radius" value="0.6"/>{turn}</shape>'
     yield "cylinder-points", '<shape type="cylinder"><point name="p0" x="0.2" y="-0.5" z="0.1"/><point name="p1" x="-0.3" y="0.4" z="0.6"/><float name="radius" value="0.3"/></shape>'
@@ -246,8 +247,9 @@ def main():
                 shade.append({"p": p, "n": n, "u": u, "d": vec(ds.d), "dist": num(ds.dist), "pdf": num(ds.pdf), "delta": bool(ds.delta),
                               "weight": vec(w), "emitter_n": vec(ds.n)})
             if name.startswith(("area", "spectrum", "constant", "envmap")):
-                for k in range(12):
-                    d = rng.normal(size=3)
+                axes = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+                for k in range(18):
+                    d = rng.normal(size=3) if k < 12 or p != pts[2][0] or not name.startswith(("constant", "envmap")) else np.array(axes[k - 12])
                     if name.startswith(("area", "spectrum")):
                         d = np.array([0.3, 0.2, 3]) - p + 0.3 * d
                     d = [num(x) for x in d / np.linalg.norm(d)]
@@ -261,9 +263,21 @@ def main():
             u2, u3 = [num(x) for x in rng.random(2)], [num(x) for x in rng.random(2)]
             ray, w = e.sample_ray(0.0, 0.5, u2, u3)
             emit.append({"u2": u2, "u3": u3, "o": vec(ray.o), "d": vec(ray.d), "weight": vec(w)})
+        falloff = []
+        if name.startswith("spot"):
+            o, to = np.array([0.5, 0.2, 2.0]), np.array([-0.5, -0.2, -2.0])
+            to /= np.linalg.norm(to)
+            side = np.cross(to, [0, 1, 0])
+            side /= np.linalg.norm(side)
+            for deg in (0, 5, 10, 14, 16, 18, 19.5, 22, 30, 40, 45, 49.5, 51, 90, 120):
+                a = math.radians(deg)
+                it = dr.zeros(mi.SurfaceInteraction3f)
+                it.p = [float(x) for x in o + 2 * (math.cos(a) * to + math.sin(a) * side)]
+                w = np.array(e.sample_direction(it, [0.5, 0.5])[1]) * 4
+                falloff.append({"angle": deg, "intensity": vec(w)})
         bs = scene.bbox().bounding_sphere()
         out.append({"name": name, "xml": xml, "floor": FLOOR, "bounding_sphere": vec(bs.center) + [num(bs.radius)], "shade": shade,
-                    "toward": toward, "emit": emit})
+                    "toward": toward, "emit": emit, **({"falloff": falloff} if falloff else {})})
     write("emitter_values.json", {**head, "emitters": out})
 
     out = []
