@@ -80,8 +80,9 @@ impl Path<'_> {
         let mut ray = camera_ray.ray;
         let mut throughput = Rgb::WHITE;
         let mut eta = 1.0f32;
-        // How the last direction was sampled: where from and with which density; `None` where next event estimation could not have.
-        let mut sampled_from = None;
+        // Where the last direction left from, and its density; `None` where next event estimation could not have found it.
+        let mut from = camera_ray.end.p;
+        let mut sampled_pdf = None;
         let mut class = PathClass::default();
         let counts = |depth: u32, class: &PathClass| {
             depth >= self.common.min_depth
@@ -95,13 +96,13 @@ impl Path<'_> {
             let hit = scene.intersect(&ray);
             let emitted = match &hit {
                 Some(hit) if hit.emitter.is_none() => None,
-                Some(hit) => scene.emitted(hit, -ray.d, sampled_from.map(|(from, _)| from)),
-                None => scene.escaped(ray.d, sampled_from.map(|(from, _)| from)),
+                Some(hit) => Some(scene.emitted(hit, -ray.d, from)),
+                None => Some(scene.escaped(ray.d, from)),
             };
             if let Some(emitted) = emitted
                 && counts(depth, &class)
             {
-                let weight = sampled_from.map_or(1.0, |(_, pdf)| power_heuristic(pdf, emitted.pdf_direct.0));
+                let weight = sampled_pdf.map_or(1.0, |pdf| power_heuristic(pdf, emitted.pdf_direct.0));
                 sum += throughput * emitted.radiance * weight;
             }
             let Some(hit) = hit else { break };
@@ -110,7 +111,7 @@ impl Path<'_> {
             }
 
             // ---- The surface
-            let Some(point) = SurfacePoint::new(&hit, scene.bsdf(&hit), ray.d) else {
+            let Some(point) = SurfacePoint::new(&hit, scene.bsdf(hit.shape), ray.d) else {
                 tally.sides_disagree += 1;
                 break;
             };
@@ -128,7 +129,7 @@ impl Path<'_> {
             let u_emitter = stream.next_1d();
             let u_light = Vec2::from(stream.next_2d());
             if point.bsdf.max_roughness() > 0.0
-                && let Some(light) = scene.sample_direct(&point.end, u_emitter, u_light)
+                && let Some(light) = scene.sample_direct(point.end.p, u_emitter, u_light)
             {
                 let (f, pdf) = point.eval_pdf(light.wi, Mode::Radiance, lobes);
                 if CLASSES {
@@ -136,7 +137,7 @@ impl Path<'_> {
                 }
                 if !f.is_black() && counts(depth + 1, &class) {
                     tally.rays += 1;
-                    if !scene.occluded(&point.end, &light.end) {
+                    if scene.visible(&point.end, &light) {
                         let reachable = matches!(light.kind, EmitterKind::Surface | EmitterKind::Infinite);
                         let weight = if reachable { power_heuristic(light.pdf.0, pdf) } else { 1.0 };
                         let cos = light.wi.dot(point.frame.n).abs();
@@ -155,9 +156,16 @@ impl Path<'_> {
             throughput *= scattered.weight;
             eta *= scattered.eta;
             if CLASSES {
-                class.push(if scattered.delta { b'S' } else if lobes == Lobes::Rough(1.0) { b'D' } else { b'G' });
+                class.push(if scattered.delta {
+                    b'S'
+                } else if lobes == Lobes::Rough(1.0) {
+                    b'D'
+                } else {
+                    b'G'
+                });
             }
-            sampled_from = (!scattered.delta).then_some((point.end.p, scattered.pdf_fwd));
+            from = point.end.p;
+            sampled_pdf = (!scattered.delta).then_some(scattered.pdf_fwd);
 
             // ---- Russian roulette
             if depth >= self.common.rr_depth {

@@ -139,7 +139,7 @@ impl Sppm<'_> {
         let roulette = Roulette { depth: self.common.rr_depth };
         let escape = walk(self.scene, Mode::Radiance, start, roulette, stream, tally, |vertex, stream, _| {
             if vertex.hit.emitter.is_some() && counts(vertex.depth) {
-                emission += vertex.throughput * self.scene.emitted(&vertex.hit, -vertex.d, None).map_or(Rgb::BLACK, |e| e.radiance);
+                emission += vertex.throughput * self.scene.emitted(&vertex.hit, -vertex.d, vertex.from).radiance;
             }
             let Some(point) = vertex.point else { return Step::Scatter(Lobes::All, 1.0) };
             if vertex.depth >= self.max_depth() {
@@ -162,7 +162,7 @@ impl Sppm<'_> {
         if let Some(escape) = escape
             && counts(escape.depth)
         {
-            emission += escape.throughput * self.scene.escaped(escape.ray.d, None).map_or(Rgb::BLACK, |e| e.radiance);
+            emission += escape.throughput * self.scene.escaped(escape.ray.d, escape.ray.o).radiance;
         }
         (emission, measured)
     }

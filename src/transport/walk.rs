@@ -41,6 +41,8 @@ pub struct Vertex<'a> {
     pub hit: Hit,
     /// Ready to scatter; `None` where the sides of the arriving direction disagree, so that nothing but emission counts.
     pub point: Option<SurfacePoint<'a>>,
+    /// Origin of the ray that arrived.
+    pub from: Vec3,
     /// Unit direction of the ray that arrived.
     pub d: Vec3,
     /// Throughput of the walk on arrival.
@@ -114,8 +116,8 @@ pub fn walk<'a, S: Stream>(
             return Some(Escape { ray, throughput, depth });
         };
         length += hit.t;
-        let point = SurfacePoint::new(&hit, scene.bsdf(&hit), ray.d);
-        let vertex = Vertex { hit, point, d: ray.d, throughput, depth, length };
+        let point = SurfacePoint::new(&hit, scene.bsdf(hit.shape), ray.d);
+        let vertex = Vertex { hit, point, from: ray.o, d: ray.d, throughput, depth, length };
         let Step::Scatter(lobes, probability) = visit(&vertex, stream, tally) else { return None };
         let Some(point) = point else {
             tally.sides_disagree += 1;
