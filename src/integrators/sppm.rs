@@ -209,10 +209,8 @@ impl Integrator for Sppm<'_> {
         // The grid's cells are as wide as a typical query, so that one touches about two runs a row.
         self.cell = match self.radius_at(0) {
             Radius::World(r) => 2.0 * r,
-            Radius::Footprints(p) => {
-                let scale = self.scene.bounds().radius().max(f32::MIN_POSITIVE);
-                2.0 * p * self.median_footprint(&mut stats).unwrap_or(scale)
-            }
+            // Without any measurement point the grid is never asked.
+            Radius::Footprints(p) => 2.0 * p * self.median_footprint(&mut stats).unwrap_or(1.0),
         };
         Ok(stats)
     }

@@ -31,7 +31,7 @@ pub struct LightPath {
 }
 
 /// All light subpaths of a scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct LightPaths<'a> {
     /// The scene.
     pub scene: &'a Scene,
