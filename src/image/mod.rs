@@ -1,3 +1,4 @@
 //! Images: the film's sums and counts, EXR files with metadata, metrics, tone mapping.
 
 pub mod film;
+pub mod tiles;

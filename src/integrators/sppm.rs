@@ -38,6 +38,11 @@ impl Settings for SppmSettings {
     fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
         self.photons.validate().map_err(|message| MethodError::Settings { method: "sppm", message })?;
         let SamplerName::Uniform = self.photons.sampler;
+        if common.paths.is_some() {
+            let message =
+                "--paths: photons do not keep the class of their path; use --min-depth and --max-depth, or the method path".into();
+            return Err(MethodError::Settings { method: "sppm", message });
+        }
         let threshold = self.photons.roughness_threshold.unwrap_or(ROUGHNESS_THRESHOLD);
         Ok(Box::new(Sppm {
             scene,

@@ -65,7 +65,11 @@ fn the_scan_sees_an_import() {
 
 /// Equation keys are written `[NAME (12)]` or `[NAME12 3.4]`: capitals first, then perhaps digits.
 fn keys(text: &str) -> BTreeSet<String> {
-    let is_key = |s: &str| s.len() >= 3 && s.chars().take(2).all(|c| c.is_ascii_uppercase()) && s.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || "*-+".contains(c));
+    let is_key = |s: &str| {
+        s.len() >= 3
+            && s.chars().take(2).all(|c| c.is_ascii_uppercase())
+            && s.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || "*-+".contains(c))
+    };
     let comments = text.lines().filter(|line| line.trim_start().starts_with("//"));
     comments
         .flat_map(|line| line.split('[').skip(1))
