@@ -80,9 +80,7 @@ pub struct Bvh {
     primitives: usize,
 }
 
-/// Stack entries when the tree is of usual depth: a million triangles need about 50.
-const SHALLOW: usize = 64;
-/// Stack entries for any tree at all: `build` sees to it that none needs more.
+/// Stack entries of a walk: a million triangles need about 80, and `build` sees to it that no tree needs more.
 const DEEP: usize = 512;
 
 impl Bvh {
@@ -111,10 +109,10 @@ impl Bvh {
 
 impl Accel for Bvh {
     fn closest(&self, ray: &Ray) -> Option<RawHit> {
-        if self.stack <= SHALLOW { self.closest_within::<SHALLOW>(ray) } else { self.closest_within::<DEEP>(ray) }
+        self.find_closest(ray)
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        if self.stack <= SHALLOW { self.occluded_within::<SHALLOW>(ray) } else { self.occluded_within::<DEEP>(ray) }
+        self.find_any(ray)
     }
 }
