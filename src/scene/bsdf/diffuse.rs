@@ -47,4 +47,26 @@ impl Diffuse {
     pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
         if given.z <= 0.0 || !lobes.admit(1.0) { 0.0 } else { self.reflectance.eval(uv).mean() }
     }
+
+    #[inline]
+    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, _mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        (self.eval(uv, sampled, given, lobes), self.pdf(uv, given, sampled, lobes))
+    }
+
+    #[inline]
+    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+        lobes.admit(1.0)
+    }
+
+    pub(super) fn max_roughness(&self) -> f32 {
+        1.0
+    }
+
+    pub(super) fn anisotropic(&self) -> bool {
+        false
+    }
+
+    pub(super) fn transmissive(&self) -> bool {
+        false
+    }
 }

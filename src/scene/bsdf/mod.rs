@@ -78,57 +78,117 @@ pub struct BsdfSample {
 pub enum Bsdf {
     /// Lambertian reflection from the front.
     Diffuse(diffuse::Diffuse),
+    /// The same material (or another one) on the back as well.
+    TwoSided(twosided::TwoSided),
+    /// Smooth glass with an inside and an outside.
+    Dielectric(dielectric::Dielectric),
+    /// A smooth pane, both of whose faces are this surface.
+    ThinDielectric(thindielectric::ThinDielectric),
+    /// Smooth metal.
+    Conductor(conductor::Conductor),
+    /// Metal with a microfacet surface.
+    RoughConductor(roughconductor::RoughConductor),
+    /// Glass with a microfacet surface.
+    RoughDielectric(roughdielectric::RoughDielectric),
+    /// A diffuse base under a smooth dielectric coat.
+    Plastic(plastic::Plastic),
+    /// A diffuse base under a microfacet dielectric coat.
+    RoughPlastic(Box<roughplastic::RoughPlastic>),
+    /// A weighted sum of two materials.
+    Blend(blend::Blend),
+    /// A material with holes.
+    Mask(mask::Mask),
+    /// The energy-conserving Phong model.
+    Phong(phong::Phong),
+}
+
+macro_rules! dispatch {
+    ($self:expr, $b:ident => $call:expr) => {
+        match $self {
+            Bsdf::Diffuse($b) => $call,
+            Bsdf::TwoSided($b) => $call,
+            Bsdf::Dielectric($b) => $call,
+            Bsdf::ThinDielectric($b) => $call,
+            Bsdf::Conductor($b) => $call,
+            Bsdf::RoughConductor($b) => $call,
+            Bsdf::RoughDielectric($b) => $call,
+            Bsdf::Plastic($b) => $call,
+            Bsdf::RoughPlastic($b) => $call,
+            Bsdf::Blend($b) => $call,
+            Bsdf::Mask($b) => $call,
+            Bsdf::Phong($b) => $call,
+        }
+    };
 }
 
 impl Bsdf {
     /// `f(wi -> wo)` for radiance, without cosine, over the non-delta lobes among `lobes`.
+    #[inline]
     pub fn eval(&self, uv: Vec2, wi: Vec3, wo: Vec3, lobes: Lobes) -> Rgb {
-        match self {
-            Bsdf::Diffuse(b) => b.eval(uv, wi, wo, lobes),
-        }
+        dispatch!(self, b => b.eval(uv, wi, wo, lobes))
     }
 
     /// Density per steradian of `sampled` given `given`, over the non-delta lobes among `lobes`; includes the probability of choosing
     /// a non-delta lobe, so it integrates to at most 1.
+    #[inline]
     pub fn pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
-        match self {
-            Bsdf::Diffuse(b) => b.pdf(uv, given, sampled, lobes),
-        }
+        dispatch!(self, b => b.pdf(uv, given, sampled, lobes))
     }
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, for a walk in `mode`: what next event estimation asks.
+    #[inline]
     pub fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        let (wi, wo) = mode.roles(given, sampled);
-        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+        dispatch!(self, b => b.eval_pdf(uv, given, sampled, mode, lobes))
     }
 
     /// A direction drawn from the lobes asked for, deltas included; `None` where the walk ends (absorbed, or below the surface).
     /// `u_lobe` chooses the lobe, `u` the direction; each coordinate is in [0, 1).
+    #[inline]
     pub fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        match self {
-            Bsdf::Diffuse(b) => b.sample(uv, given, mode, lobes, u_lobe, u),
-        }
+        dispatch!(self, b => b.sample(uv, given, mode, lobes, u_lobe, u))
     }
 
     /// The share of light from `given` that the lobes asked for scatter on (mean over colour, in [0, 1]), exact or approximate: for
     /// choices only, which are divided by it. Zero only where [`Bsdf::sample`] always answers `None`.
+    #[inline]
     pub fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
-        match self {
-            Bsdf::Diffuse(b) => b.albedo(uv, given, lobes),
-        }
+        dispatch!(self, b => b.albedo(uv, given, lobes))
+    }
+
+    /// Does any lobe, on any side, pass the filter?
+    #[inline]
+    pub fn admitted_by(&self, lobes: Lobes) -> bool {
+        dispatch!(self, b => b.admitted_by(lobes))
     }
 
     /// Roughness of the roughest lobe there is anywhere on the surface; 0 if all are deltas.
     pub fn max_roughness(&self) -> f32 {
-        match self {
-            Bsdf::Diffuse(_) => 1.0,
-        }
+        dispatch!(self, b => b.max_roughness())
     }
 
     /// Is any lobe anisotropic, so that the frame's tangent must follow `dp/du`?
     pub fn anisotropic(&self) -> bool {
-        false
+        dispatch!(self, b => b.anisotropic())
+    }
+
+    /// Can light pass through the surface? Such materials cannot be [`twosided`].
+    pub fn transmissive(&self) -> bool {
+        dispatch!(self, b => b.transmissive())
     }
 }
 
+pub mod blend;
+pub mod conductor;
+pub mod dielectric;
 pub mod diffuse;
+pub mod fresnel;
+pub mod ior;
+pub mod mask;
+pub mod microfacet;
+pub mod phong;
+pub mod plastic;
+pub mod roughconductor;
+pub mod roughdielectric;
+pub mod roughplastic;
+pub mod thindielectric;
+pub mod twosided;

@@ -1,9 +1,13 @@
 //! Light sources: radiance seen, direct sampling from a point, and emission sampling of a ray.
+//!
+//! A surface emits from the side of its shading normal, as Mitsuba's does. The **emitting side** of a point is the side of the geometric
+//! normal on which the shading normal lies; it emits into directions that are above both normals. All cosines and densities belong to
+//! the geometric normal, so that every technique estimates the same integral on smooth-shaded lights too.
 
 use super::EmitterId;
-use super::hit::{Endpoint, Hit};
+use super::hit::Endpoint;
 use crate::math::{AreaPdf, Rgb, SolidAnglePdf};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// What kind of technique can reach an emitter, for MIS.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +35,7 @@ pub struct DirectSample {
     pub end: Endpoint,
     /// Distance to it; infinite for emitters at infinity.
     pub distance: f32,
-    /// Cosine at the light between its shading normal and `-wi` (positive: the emitting side); 1 where there is no surface.
+    /// Cosine at the light between `-wi` and its geometric normal on the emitting side (positive); 1 where there is no surface.
     pub cos_light: f32,
     /// Radiance arriving along `-wi`, before visibility. For delta emitters the irradiance at normal incidence (`I/d^2`, or the directional
     /// emitter's irradiance), so that `f cos radiance / pdf` is the estimate for every kind.
@@ -51,7 +55,7 @@ pub struct EmissionSample {
     pub end: Endpoint,
     /// Unit direction of travel.
     pub d: Vec3,
-    /// Cosine at the light between its shading normal and `d`; 1 where there is no surface.
+    /// Cosine at the light between `d` and its geometric normal on the emitting side (positive); 1 where there is no surface.
     pub cos_light: f32,
     /// Flux of this sample: `Le cos / (pdf_position pdf_direction)`, the choice of emitter included. Its mean over samples is the
     /// power of all emitters.
@@ -64,7 +68,7 @@ pub struct EmissionSample {
 }
 
 /// Radiance of an emitter seen along a ray, with the densities other techniques would have had.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Emitted {
     /// Radiance towards the viewer.
     pub radiance: Rgb,
@@ -72,5 +76,84 @@ pub struct Emitted {
     pub pdf_direct: SolidAnglePdf,
 }
 
-// To be written here: enum Emitter, its files, and the `Emitters` table with a power-weighted choice.
-const _: fn(&Hit, Vec2) = |_, _| ();
+/// Densities with which emission sampling would have drawn a position and a direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmissionPdf {
+    /// As [`EmissionSample::pdf_position`].
+    pub position: AreaPdf,
+    /// As [`EmissionSample::pdf_direction`].
+    pub direction: SolidAnglePdf,
+}
+
+/// Every light source. Adding one touches its own file, this list and one line of the loader's table.
+#[derive(Clone, Debug)]
+pub enum Emitter {
+    /// A shape that shines; made by [`super::Scene::build`] from [`super::shape::Shape::radiance`].
+    Area(Area),
+    /// The same intensity in every direction from one position.
+    Point(Point),
+    /// A cone of light from one position.
+    Spot(Spot),
+    /// Parallel light.
+    Directional(Directional),
+    /// The same radiance from all around.
+    Constant(Constant),
+    /// An image of radiance from all around.
+    Envmap(Envmap),
+}
+
+/// A light source that cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum EmitterError {
+    /// A spot's angles are out of order.
+    #[error("a spot needs 0 < cutoff_angle <= 180 and 0 <= beam_width <= cutoff_angle; these are {cutoff_angle} and {beam_width} degrees")]
+    SpotAngles {
+        /// Half-angle of the cone, degrees.
+        cutoff_angle: f32,
+        /// Half-angle of full intensity, degrees.
+        beam_width: f32,
+    },
+    /// The direction vanishes.
+    #[error("the {0} emitter's direction is zero or not finite: check its direction or to_world")]
+    Singular(&'static str),
+    /// The image does not have the pixels it says, or too few of them.
+    #[error("an envmap needs at least 2x2 pixels, {width}x{height} of them; found {found}")]
+    EnvmapSize {
+        /// Pixels across.
+        width: usize,
+        /// Pixels down.
+        height: usize,
+        /// Pixels given.
+        found: usize,
+    },
+    /// A pixel is negative or not finite.
+    #[error("envmap pixel ({x}, {y}) is {value:?}: radiance must be finite and not negative")]
+    EnvmapPixel {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+        /// What it holds.
+        value: [f32; 3],
+    },
+    /// Radiance, intensity or irradiance is negative or not finite.
+    #[error("an emitter's {what} is {value:?}: it must be finite and not negative")]
+    Value {
+        /// What it is.
+        what: &'static str,
+        /// What it holds.
+        value: [f32; 3],
+    },
+}
+
+mod area;
+mod distant;
+mod envmap;
+mod point;
+mod spot;
+
+pub use area::Area;
+pub use distant::{Constant, Directional};
+pub use envmap::Envmap;
+pub use point::Point;
+pub use spot::Spot;

@@ -1,0 +1,51 @@
+//! Metal with a microfacet surface, black from behind.
+
+use super::microfacet::Microfacet;
+use super::{BsdfSample, Lobes, Mode};
+use crate::math::Rgb;
+use crate::scene::texture::Texture;
+use glam::{Vec2, Vec3};
+
+/// Microfacet reflection of a metal ([WALTER07 (20)]), single scattering.
+#[derive(Clone, Debug)]
+pub struct RoughConductor {
+    /// Distribution of the microfacets' normals.
+    pub distribution: Microfacet,
+    /// Real part of the complex index of refraction, relative to the outside.
+    pub eta: Rgb,
+    /// Imaginary part of the complex index of refraction, relative to the outside.
+    pub k: Rgb,
+    /// Factor on reflected light, in [0, 1]; 1 is physical.
+    pub specular_reflectance: Texture,
+}
+
+impl RoughConductor {
+    pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
+        Rgb::BLACK
+    }
+    pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
+        0.0
+    }
+    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        let (wi, wo) = mode.roles(given, sampled);
+        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+    }
+    pub(super) fn sample(&self, _uv: Vec2, _given: Vec3, _mode: Mode, _lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
+        None
+    }
+    pub(super) fn albedo(&self, _uv: Vec2, _given: Vec3, _lobes: Lobes) -> f32 {
+        0.0
+    }
+    pub(super) fn admitted_by(&self, _lobes: Lobes) -> bool {
+        false
+    }
+    pub(super) fn max_roughness(&self) -> f32 {
+        0.0
+    }
+    pub(super) fn anisotropic(&self) -> bool {
+        false
+    }
+    pub(super) fn transmissive(&self) -> bool {
+        false
+    }
+}
