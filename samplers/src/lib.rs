@@ -2,6 +2,8 @@
 //!
 //! A light path is a function of a [`Stream`]. The same function serves independent numbers, a Markov chain or a replay.
 
+pub mod sampler;
 pub mod stream;
 
-pub use stream::{Key, Purpose, Replay, Stream, UniformStream};
+pub use sampler::{Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
+pub use stream::{Key, Purpose, Recorder, Replay, Stream, UniformStream};

@@ -5,4 +5,5 @@ pub mod file;
 pub mod film;
 pub mod metrics;
 pub mod picture;
+pub mod tiles;
 pub mod tonemap;

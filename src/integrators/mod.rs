@@ -2,9 +2,14 @@
 //!
 //! A method is prepared once and then iterated; it knows no loop, no clock and no file (`render` does).
 
+pub mod path;
+pub mod photon_settings;
+pub mod sppm;
+
 use crate::image::film::Film;
 use crate::scene::Scene;
-use clap::{ArgMatches, Args, Command, FromArgMatches};
+use crate::transport::walk::Tally;
+use clap::{ArgMatches, Args, Command};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -40,6 +45,14 @@ pub struct IterationStats {
 }
 
 impl IterationStats {
+    /// Adds what walks cost and gave up.
+    pub fn count(&mut self, tally: &Tally) {
+        self.rays += tally.rays;
+        for (cause, count) in tally.rejected() {
+            *self.rejected.entry(cause).or_default() += count;
+        }
+    }
+
     /// Adds another's counts.
     pub fn add(&mut self, other: &IterationStats) {
         self.camera_paths += other.camera_paths;
@@ -132,4 +145,7 @@ pub const fn method<S: Settings>(name: &'static str, about: &'static str, page: 
 }
 
 /// Every method. The command line, `list`, studies, smoke tests and the documentation check walk this slice.
-pub const METHODS: &[Method] = &[];
+pub const METHODS: &[Method] = &[
+    method::<path::PathSettings>("path", "Path tracing with next event estimation", "methods/path.md"),
+    method::<sppm::SppmSettings>("sppm", "Stochastic progressive photon mapping", "methods/sppm.md"),
+];

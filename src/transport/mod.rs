@@ -1,1 +1,5 @@
-//! Room under construction.
+//! How light travels: what happens at a surface point, and the one random walk of both directions.
+
+pub mod class;
+pub mod shading;
+pub mod walk;

@@ -1,0 +1,73 @@
+//! Path classes in Heckbert's letters [HECKBERT90]: `L` the light, `D` a diffuse event, `G` a glossy one, `S` a delta, `E` the eye.
+
+use regex::Regex;
+
+/// The events of a path so far, from the eye. Paths longer than the buffer keep their last letters out and match nothing.
+#[derive(Clone, Debug)]
+pub struct PathClass {
+    letters: [u8; MAX],
+    length: usize,
+}
+
+/// Events kept.
+const MAX: usize = 128;
+
+impl Default for PathClass {
+    fn default() -> Self {
+        Self { letters: [0; MAX], length: 0 }
+    }
+}
+
+impl PathClass {
+    /// Adds an event on the light's side.
+    pub fn push(&mut self, letter: u8) {
+        if let Some(place) = self.letters.get_mut(self.length) {
+            *place = letter;
+        }
+        self.length += 1;
+    }
+
+    /// Takes the last event back.
+    pub fn pop(&mut self) {
+        self.length = self.length.saturating_sub(1);
+    }
+
+    /// Does the whole class, from the light, match?
+    pub fn matches(&self, pattern: &Regex) -> bool {
+        self.join(&[], pattern)
+    }
+
+    /// Does the class match whose light-side events are `light` (from the light) and whose camera-side events are these?
+    pub fn join(&self, light: &[u8], pattern: &Regex) -> bool {
+        let mut class = String::with_capacity(light.len() + self.length + 2);
+        class.push('L');
+        class.extend(light.iter().map(|&c| char::from(c)));
+        let Some(letters) = self.letters.get(..self.length) else { return false };
+        class.extend(letters.iter().rev().map(|&c| char::from(c)));
+        class.push('E');
+        pattern.is_match(&class)
+    }
+}
+
+/// A pattern for whole classes, such as `LS+DE`.
+pub fn pattern(text: &str) -> Result<Regex, regex::Error> {
+    Regex::new(&format!("^(?:{text})$"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn classes_read_from_the_light() {
+        let mut class = PathClass::default();
+        assert!(class.matches(&pattern("LE").unwrap()));
+        class.push(b'S');
+        class.push(b'D');
+        assert!(class.matches(&pattern("LDSE").unwrap()));
+        assert!(!class.matches(&pattern("LD").unwrap()), "patterns are for whole classes");
+        assert!(class.join(b"SS", &pattern("LS+DSE").unwrap()));
+        class.pop();
+        assert!(class.matches(&pattern("LS?E").unwrap()));
+    }
+}

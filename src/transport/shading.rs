@@ -1,0 +1,102 @@
+//! Scattering at a surface point in world space: shading normals, their adjoint factor, and the rule for sides that disagree.
+
+use crate::math::{Frame, Rgb};
+use crate::scene::bsdf::{Bsdf, Lobes, Mode};
+use crate::scene::hit::{Endpoint, Hit};
+use glam::{Vec2, Vec3};
+
+/// Does a direction lie on the same side of the surface by its geometric and by its shading normal?
+///
+/// The one rule for directions whose sides disagree, shared by every method and both walks: no light passes along them. Mitsuba's
+/// `path` has no such rule, its `ptracer` has this one; `docs/shading-normals.md` lists where the choice moves an image and by how much.
+#[inline(always)]
+pub fn sides_agree(w: Vec3, n_g: Vec3, n_s: Vec3) -> bool {
+    w.dot(n_g) * w.dot(n_s) > 0.0
+}
+
+/// A direction sampled at a surface point, in world space.
+#[derive(Clone, Copy, Debug)]
+pub struct Scattered {
+    /// Unit direction of the next ray.
+    pub d: Vec3,
+    /// Factor on the throughput: `f cos / pdf`, with the adjoint factor in importance mode.
+    pub weight: Rgb,
+    /// Density of `d` per steradian, or its probability for a delta.
+    pub pdf_fwd: f32,
+    /// Density of the direction the walk came from, had it come along `d`.
+    pub pdf_rev: f32,
+    /// From a delta lobe.
+    pub delta: bool,
+    /// Roughness of the lobe, 0 for a delta.
+    pub roughness: f32,
+    /// Index of refraction on the sampled side over that on the given side.
+    pub eta: f32,
+}
+
+/// A surface point reached by a walk, ready to scatter.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint<'a> {
+    /// The material there.
+    pub bsdf: &'a Bsdf,
+    /// Where.
+    pub end: Endpoint,
+    /// Shading frame.
+    pub frame: Frame,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Unit direction the walk came from, world space.
+    pub given: Vec3,
+    /// The same in the shading frame.
+    pub given_local: Vec3,
+}
+
+impl<'a> SurfacePoint<'a> {
+    /// At a hit, for a ray that travelled along `d`. `None` where the sides of `-d` disagree: nothing scatters there.
+    #[inline]
+    pub fn new(hit: &Hit, bsdf: &'a Bsdf, d: Vec3) -> Option<Self> {
+        let given = -d;
+        sides_agree(given, hit.end.n_g, hit.frame.n).then(|| Self {
+            bsdf,
+            end: hit.end,
+            frame: hit.frame,
+            uv: hit.uv,
+            given,
+            given_local: hit.frame.to_local(given),
+        })
+    }
+
+    /// `f(wi -> wo)` towards the world direction `w` and the density of `w`, over the lobes asked for and without any cosine; black
+    /// where the sides of `w` disagree.
+    #[inline]
+    pub fn eval_pdf(&self, w: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        if !sides_agree(w, self.end.n_g, self.frame.n) {
+            return (Rgb::BLACK, 0.0);
+        }
+        self.bsdf.eval_pdf(self.uv, self.given_local, self.frame.to_local(w), mode, lobes)
+    }
+
+    /// A next direction. `None` where the walk ends: absorbed, or the sides of the sampled direction disagree.
+    #[inline]
+    pub fn sample(&self, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<Scattered> {
+        let s = self.bsdf.sample(self.uv, self.given_local, mode, lobes, u_lobe, u)?;
+        let d = self.frame.to_world(s.w);
+        if !sides_agree(d, self.end.n_g, self.frame.n) {
+            return None;
+        }
+        let weight = match mode {
+            Mode::Radiance => s.weight,
+            Mode::Importance => s.weight * self.adjoint(d),
+        };
+        Some(Scattered { d, weight, pdf_fwd: s.pdf_fwd, pdf_rev: s.pdf_rev, delta: s.delta, roughness: s.roughness, eta: s.eta })
+    }
+
+    /// The adjoint factor of shading normals, `|wi.n_s| |wo.n_g| / (|wi.n_g| |wo.n_s|)`, for a light-side walk that came along `wi` =
+    /// `given` and leaves along `wo` = `d`: the quotient of [VEACH (5.17)] to the plain `f |wo.n_s|`. 1 where the normals are one.
+    #[inline]
+    pub fn adjoint(&self, d: Vec3) -> f32 {
+        let (n_g, n_s) = (self.end.n_g, self.frame.n);
+        let numerator = self.given_local.z * d.dot(n_g);
+        let denominator = self.given.dot(n_g) * d.dot(n_s);
+        (numerator / denominator).abs()
+    }
+}

@@ -1,0 +1,146 @@
+//! Renders against stored references, over many seeds: minutes, not seconds. `.ci/run` runs them:
+//!
+//! `cargo test --release --test verification -- --ignored --nocapture --test-threads 1`
+
+#[path = "../support/mod.rs"]
+mod support;
+
+use isophote::image::tiles::{Reference, TileTest, run_means, tiles};
+use isophote::math::Rgb;
+use isophote::math::statistics::{Sample, least_squares, sidak, welch};
+use support::{common, load_file, reference, root, runs, shared};
+
+const SIZE: (u32, u32) = (96, 96);
+const DEPTH: Option<u32> = Some(65);
+
+/// Share of pixels cut, by scene: Mitsuba's own path tracer finds some light there only as fireflies.
+fn cut(scene: &str) -> f64 {
+    if matches!(scene, "veach-bidir" | "veach-mis") { 0.001 } else { 0.0 }
+}
+
+fn shared_reference(name: &str) -> Option<Reference> {
+    Some(reference(&shared()?.join("references").join(name), 16))
+}
+
+fn path_agrees(name: &str, iterations: u64) {
+    let Some(expected) = shared_reference(name) else { return };
+    let scene = load_file(&shared().unwrap().join("scenes").join(name).join("scene.xml"), Some(SIZE));
+    let images = runs(&scene, "path", "{}", &common(0, DEPTH), iterations, 16);
+    let report = TileTest { block: 16, family: 0.01, cut: cut(name) }.run(&images, &expected);
+    eprintln!("path {name}, 16 seeds of {iterations}: {}", report.describe());
+    assert!(report.passed(), "path on {name}: {}", report.describe());
+    assert!((report.ratio - 1.0).abs() <= 1.5 * report.ratio_half_width, "path on {name}: mean ratio {}", report.describe());
+}
+
+macro_rules! against_shared {
+    ($($test:ident: $scene:literal, $iterations:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes; run by .ci/run"]
+        fn $test() {
+            path_agrees($scene, $iterations);
+        }
+    )*};
+}
+
+against_shared! {
+    path_on_cbox_spheres: "cbox-spheres", 256;
+    path_on_cornell_box: "cornell-box", 256;
+    path_on_modern_hall: "modern-hall", 128;
+    path_on_veach_bidir: "veach-bidir", 256;
+    path_on_veach_mis: "veach-mis", 256;
+}
+
+/// Every scene of this repository that has a reference: `path` agrees with Mitsuba.
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn path_on_own_scenes() {
+    let mut failures = Vec::new();
+    for name in ["box", "glass-box", "furnace", "textured-room"] {
+        let folder = root().join("scenes").join(name);
+        let expected = reference(&folder.join("reference").join(name), 16);
+        let scene = load_file(&folder.join("scene.xml"), Some((expected.width as u32, expected.height as u32)));
+        let images = runs(&scene, "path", "{}", &common(0, scene.defaults.max_depth), 256, 16);
+        let report = TileTest { block: 16, family: 0.01, cut: 0.0 }.run(&images, &expected);
+        eprintln!("path {name}: {}", report.describe());
+        if !report.passed() {
+            failures.push(format!("{name}: {}", report.describe()));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Radius extrapolation: `E(r) = I + a r + c r^2` on constant radii, fitted on run means; the intercept meets the reference. (A disk that
+/// crosses an edge of shadow or geometry is biased in r, not r^2.)
+fn sppm_extrapolates(name: &str, radii: [f64; 5], iterations: u64, seeds: u64) {
+    let Some(expected) = shared_reference(name) else { return };
+    let scene = load_file(&shared().unwrap().join("scenes").join(name).join("scene.xml"), Some(SIZE));
+    let kept = expected.kept(cut(name));
+    let images: Vec<Vec<Vec<Rgb>>> = radii
+        .iter()
+        .enumerate()
+        .map(|(k, radius)| {
+            let settings = format!("{{\"radius_pixels\": {radius}, \"alpha\": 1.0, \"photons\": 50000}}");
+            // Radii must be independent: seeds of their own.
+            let base = common(0, DEPTH);
+            let seeds = (1..=seeds).map(|s| 1000 * (k as u64 + 1) + s);
+            seeds
+                .map(|seed| {
+                    support::render(&scene, "sppm", &settings, &isophote::integrators::Common { seed, ..base.clone() }, iterations).0
+                })
+                .collect()
+        })
+        .collect();
+    let mut places = vec![("image".to_owned(), (0..kept.len()).filter(|&i| kept[i]).collect::<Vec<usize>>())];
+    places.extend(tiles(96, 96, 16, &kept).into_iter().map(|((x, y), p)| (format!("tile ({x}, {y})"), p)));
+    let threshold = sidak(0.01, places.len() * 3);
+    let rows: Vec<Vec<f64>> = radii.iter().map(|r| vec![1.0, *r, r * r]).collect();
+    let mut failures = Vec::new();
+    for (place, pixels) in &places {
+        for channel in 0..3 {
+            let samples: Vec<Sample> = images.iter().map(|runs| Sample::of(&run_means(runs, pixels, channel))).collect();
+            let y: Vec<f64> = samples.iter().map(|s| s.mean).collect();
+            let floor = samples.iter().map(|s| s.variance).fold(0.0, f64::max) * 1e-3 + 1e-30;
+            let variance: Vec<f64> = samples.iter().map(|s| s.variance.max(floor)).collect();
+            let fit = least_squares(&rows, &y, &variance).unwrap();
+            let freedom = (radii.len() as f64) * (seeds as f64 - 1.0);
+            let intercept = Sample { n: seeds as f64, mean: fit.coefficients[0], variance: fit.covariance[0][0], freedom };
+            let r = expected.over(pixels, channel);
+            let p = welch(&intercept, &r);
+            let line = format!(
+                "{place} {}: intercept {:.5} +- {:.5}, reference {:.5} +- {:.5}, E(r) {:?}, p {p:.2e}",
+                ["R", "G", "B"][channel],
+                intercept.mean,
+                intercept.variance.sqrt(),
+                r.mean,
+                r.variance.sqrt(),
+                y.iter().map(|v| (v * 1e5).round() / 1e5).collect::<Vec<_>>(),
+            );
+            if place == "image" {
+                eprintln!("sppm {name} {line}");
+            }
+            if p < threshold {
+                failures.push(line);
+            }
+        }
+    }
+    eprintln!("sppm {name}: {} of {} tests below {threshold:.2e}", failures.len(), places.len() * 3);
+    assert!(failures.is_empty(), "sppm on {name}:\n{}", failures.join("\n"));
+}
+
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn sppm_on_cornell_box() {
+    sppm_extrapolates("cornell-box", [0.75, 1.0, 1.5, 2.0, 3.0], 48, 16);
+}
+
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn sppm_on_cbox_spheres() {
+    sppm_extrapolates("cbox-spheres", [0.75, 1.0, 1.5, 2.0, 3.0], 48, 16);
+}
+
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn sppm_on_veach_bidir() {
+    sppm_extrapolates("veach-bidir", [0.75, 1.0, 1.5, 2.0, 3.0], 48, 16);
+}
