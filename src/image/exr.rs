@@ -165,7 +165,7 @@ pub fn write(path: &Path, picture: &Picture, planes: &[Plane], metadata: Option<
     };
     let component = |pixels: &[Rgb], c: usize| -> Vec<f32> { pixels.iter().map(|p| p[c]).collect() };
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-        push(name.to_string(), component(picture.pixels(), c));
+        push(name.to_string(), component(&picture.pixels, c));
         for plane in planes {
             match plane {
                 Plane::Colour(layer, pixels) => push(format!("{layer}.{name}"), component(pixels, c)),
@@ -226,7 +226,7 @@ mod tests {
     fn what_is_written_is_read_bit_by_bit() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.exr");
-        let mut pixels = small().pixels().to_vec();
+        let mut pixels = small().pixels.to_vec();
         pixels[1] = Rgb::new(f32::INFINITY, f32::NAN, f32::MIN_POSITIVE / 4.0);
         let picture = Picture::new(3, 2, pixels);
         let variance: Vec<Rgb> = (0..6).map(|i| Rgb::splat(i as f32 * 0.5)).collect();
@@ -237,9 +237,9 @@ mod tests {
         let names: Vec<&str> = file.channels.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["B", "G", "R", "count.Y", "variance.B", "variance.G", "variance.R"]);
         assert!(file.channels.iter().all(|c| c.kind == "float"));
-        let bits = |p: &Picture| p.pixels().iter().map(|v| v.to_array().map(f32::to_bits)).collect::<Vec<_>>();
+        let bits = |p: &Picture| p.pixels.iter().map(|v| v.to_array().map(f32::to_bits)).collect::<Vec<_>>();
         assert_eq!(bits(&file.picture().expect("a picture")), bits(&picture));
-        assert_eq!(file.layer("variance").expect("a layer").pixels(), variance);
+        assert_eq!(file.layer("variance").expect("a layer").pixels, variance);
         assert!(file.metadata.as_ref().expect("metadata").is_ascii());
         assert_eq!(file.metadata_json().expect("JSON"), Some(metadata));
         assert_eq!(picture.non_finite(), 1);
@@ -251,12 +251,12 @@ mod tests {
         let path = folder.path().join("a.exr");
         let half = |a: f32, b: f32| FlatSamples::F16(vec![f16::from_f32(a), f16::from_f32(b)]);
         raw(&path, vec![("R", half(1.0, 2.0)), ("G", half(3.0, 4.0)), ("B", half(5.0, 6.0)), ("A", half(1.0, 1.0))]);
-        assert_eq!(read_picture(&path).expect("RGBA").pixels()[1], Rgb::new(2.0, 4.0, 6.0));
+        assert_eq!(read_picture(&path).expect("RGBA").pixels[1], Rgb::new(2.0, 4.0, 6.0));
         raw(&path, vec![("Y", half(0.5, 0.25))]);
-        assert_eq!(read_picture(&path).expect("Y").pixels(), [Rgb::splat(0.5), Rgb::splat(0.25)]);
+        assert_eq!(read_picture(&path).expect("Y").pixels, [Rgb::splat(0.5), Rgb::splat(0.25)]);
         let float = |v: f32| FlatSamples::F32(vec![v, v]);
         raw(&path, vec![("main.R", float(1.0)), ("main.G", float(2.0)), ("main.B", float(3.0)), ("depth.Z", float(9.0))]);
-        assert_eq!(read_picture(&path).expect("one layer").pixels()[0], Rgb::new(1.0, 2.0, 3.0));
+        assert_eq!(read_picture(&path).expect("one layer").pixels[0], Rgb::new(1.0, 2.0, 3.0));
     }
 
     #[test]
@@ -271,7 +271,7 @@ mod tests {
         let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(Vec2(2, 1)));
         Image::new(attributes, parts).write().non_parallel().to_file(&path).expect("written");
         let file = read_file(&path).expect("read");
-        assert_eq!(file.layer("normals").expect("there").pixels()[0], Rgb::splat(2.0));
+        assert_eq!(file.layer("normals").expect("there").pixels[0], Rgb::splat(2.0));
         let message = file.picture().expect_err("two candidates").to_string();
         assert!(message.contains("beauty, normals"), "{message}");
     }

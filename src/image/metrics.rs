@@ -87,9 +87,9 @@ impl Pairs {
         if reference.size() != image.size() {
             return Err(SizeMismatch { image: image.size(), reference: reference.size() });
         }
-        let mut values = Vec::with_capacity(3 * image.pixels().len());
+        let mut values = Vec::with_capacity(3 * image.pixels.len());
         let mut masked = 0;
-        for (x, r) in image.pixels().iter().zip(reference.pixels()) {
+        for (x, r) in image.pixels.iter().zip(&reference.pixels) {
             if x.is_finite() && r.is_finite() {
                 values.extend((0..3).map(|c| (f64::from(x[c]), f64::from(r[c]))));
             } else {

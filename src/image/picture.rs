@@ -3,12 +3,15 @@
 use crate::math::Rgb;
 use std::path::{Path, PathBuf};
 
-/// Linear colours, row-major from the top left.
+/// Linear colours.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    width: usize,
-    height: usize,
-    pixels: Vec<Rgb>,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// `width * height` of them, row-major from the top left.
+    pub pixels: Vec<Rgb>,
 }
 
 impl Picture {
@@ -21,24 +24,9 @@ impl Picture {
         Self { width, height, pixels }
     }
 
-    /// Pixels across.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Pixels down.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
     /// Width and height.
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
-    }
-
-    /// Row-major from the top left.
-    pub fn pixels(&self) -> &[Rgb] {
-        &self.pixels
     }
 
     /// Pixels with a component that is infinite or NaN.

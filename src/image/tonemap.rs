@@ -19,7 +19,7 @@ impl Exposure {
         match self {
             Exposure::Stops(stops) => stops.exp2(),
             Exposure::FromImage => {
-                let lit = picture.pixels().iter().map(|p| p.luminance()).filter(|l| l.is_finite() && *l > 0.0);
+                let lit = picture.pixels.iter().map(|p| p.luminance()).filter(|l| l.is_finite() && *l > 0.0);
                 let (sum, count) = lit.fold((0.0_f64, 0_u64), |(sum, count), l| (sum + f64::from(l).ln(), count + 1));
                 if count == 0 { 1.0 } else { (0.18 / (sum / count as f64).exp()) as f32 }
             }
@@ -38,9 +38,9 @@ pub fn write_png(path: &Path, picture: &Picture, exposure: Exposure) -> Result<(
     use ::image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
     let scale = exposure.scale(picture);
     let byte = |v: f32| (srgb(v * scale) * 255.0 + 0.5) as u8;
-    let bytes: Vec<u8> = picture.pixels().iter().flat_map(|p| p.to_array().map(byte)).collect();
+    let bytes: Vec<u8> = picture.pixels.iter().flat_map(|p| p.to_array().map(byte)).collect();
     let too_big = |_| ImageError::content(path, "the picture is too large for PNG");
-    let (width, height) = (u32::try_from(picture.width()).map_err(too_big)?, u32::try_from(picture.height()).map_err(too_big)?);
+    let (width, height) = (u32::try_from(picture.width).map_err(too_big)?, u32::try_from(picture.height).map_err(too_big)?);
     replace(path, |w| {
         PngEncoder::new(w).write_image(&bytes, width, height, ExtendedColorType::Rgb8).map_err(|e| ImageError::content(path, e.to_string()))
     })

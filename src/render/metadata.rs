@@ -1,6 +1,6 @@
 //! What an EXR file says about how it was made.
 
-use crate::image::metrics::{Measured, METRICS, Pairs};
+use crate::image::metrics::{METRICS, Measured, Pairs};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -126,7 +126,8 @@ mod tests {
         metadata.radius = Some(0.1 + 0.2);
         let value = serde_json::to_value(&metadata).expect("JSON");
         let keys: Vec<&str> = value.as_object().expect("an object").keys().map(String::as_str).collect();
-        let expected = "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected errors";
+        let expected =
+            "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected errors";
         assert_eq!(keys.join(" "), expected);
         assert!(value["errors"][0]["relmse_trimmed"].is_number() && value["errors"][0].get("masked").is_none());
         let back: Metadata = serde_json::from_str(&value.to_string()).expect("metadata");

@@ -11,5 +11,5 @@ pub use budget::{Budget, IterationRange};
 pub use clock::{Interrupt, RenderClock};
 pub use metadata::{ErrorRecord, Metadata, Run, SceneRecord};
 pub use progress::{Bar, Lines, Progress, Silent, Step};
-pub use run::{Layers, Output, Outcome, Plan, Reference, RenderError, render};
+pub use run::{Layers, Outcome, Output, Plan, Reference, RenderError, render};
 pub use snapshots::Snapshots;

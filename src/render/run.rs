@@ -72,11 +72,11 @@ impl Output {
         let mut planes = Vec::new();
         if self.layers.variance {
             // Of one iteration no variance is known; NaN says so.
-            let unknown = || vec![Rgb::splat(f32::NAN); picture.pixels().len()];
+            let unknown = || vec![Rgb::splat(f32::NAN); picture.pixels.len()];
             planes.push(Plane::Colour("variance", film.variance_of_mean().unwrap_or_else(unknown)));
         }
         if self.layers.count {
-            planes.push(Plane::Scalar("count", vec![film.eye_count() as f32; picture.pixels().len()]));
+            planes.push(Plane::Scalar("count", vec![film.eye_count() as f32; picture.pixels.len()]));
         }
         let metadata = serde_json::to_value(metadata).map_err(|e| ImageError::content(path, e.to_string()))?;
         exr::write(path, &picture, &planes, Some(&metadata))?;

@@ -71,8 +71,10 @@ impl Bench {
         render(&mut Fake { stateless: true, at }, &self.plan, metadata(), &mut Silent, interrupt).expect("rendered")
     }
     fn files(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            std::fs::read_dir(self.folder.path()).expect("there").map(|f| f.expect("a file").file_name().to_string_lossy().into()).collect();
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path())
+            .expect("there")
+            .map(|f| f.expect("a file").file_name().to_string_lossy().into())
+            .collect();
         names.sort();
         names
     }
@@ -88,7 +90,7 @@ fn counts_and_records_are_complete() {
     let bench = bench(2..7);
     let outcome = bench.run(|_| (), &Interrupt::default());
     let (picture, metadata) = bench.read("out.exr");
-    assert_eq!(picture.pixels(), outcome.film.mean());
+    assert_eq!(picture.pixels, outcome.film.mean());
     assert_eq!(metadata, outcome.metadata);
     assert_eq!((metadata.camera_paths, metadata.light_paths, metadata.rays), (5 * 54, 1000 + 5 * 54, 5 * 108));
     assert_eq!(metadata.rejected.get("nan"), Some(&5));
@@ -136,7 +138,14 @@ fn a_signal_ends_it_after_the_running_iteration_and_saves() {
     let bench = bench(0..1000);
     let interrupt = Interrupt::default();
     let raised = interrupt.clone();
-    let outcome = bench.run(move |i| if i == 2 { raised.raise(15) }, &interrupt);
+    let outcome = bench.run(
+        move |i| {
+            if i == 2 {
+                raised.raise(15)
+            }
+        },
+        &interrupt,
+    );
     assert_eq!((outcome.interrupted, outcome.film.iterations()), (Some(15), 3));
     assert_eq!(bench.read("out.exr").1.runs[0].ranges, [[0, 3]]);
 }
@@ -195,8 +204,8 @@ fn layers_and_previews_are_written() {
     bench.plan.output.preview = Some((bench.folder.path().join("out.png"), Exposure::FromImage));
     let outcome = bench.run(|_| (), &Interrupt::default());
     let file = exr::read_file(&bench.plan.output.path).expect("an EXR");
-    assert_eq!(file.layer("variance").expect("a layer").pixels(), outcome.film.variance_of_mean().expect("kept"));
-    assert_eq!(file.layer("count").expect("a layer").pixels()[0], Rgb::splat(4.0));
+    assert_eq!(file.layer("variance").expect("a layer").pixels, outcome.film.variance_of_mean().expect("kept"));
+    assert_eq!(file.layer("count").expect("a layer").pixels[0], Rgb::splat(4.0));
     assert_eq!(bench.files(), ["out.exr", "out.png"]);
 }
 
