@@ -1,0 +1,263 @@
+//! The loop itself.
+
+use super::budget::Budget;
+use super::clock::{Interrupt, RenderClock};
+use super::metadata::{ErrorRecord, Metadata, Run};
+use super::progress::{Progress, Step};
+use super::snapshots::Snapshots;
+use crate::image::exr::{self, Plane};
+use crate::image::film::Film;
+use crate::image::metrics::{EPSILON, Pairs, SizeMismatch};
+use crate::image::picture::{ImageError, Picture};
+use crate::image::tonemap::{Exposure, write_png};
+use crate::integrators::{Integrator, IterationStats, MethodError};
+use crate::math::Rgb;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A render cannot start or cannot be kept.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A file.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The method refuses.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// The reference is of another size.
+    #[error("{}: the image {source}", path.display())]
+    Reference {
+        /// The reference.
+        path: PathBuf,
+        /// The sizes.
+        source: SizeMismatch,
+    },
+    /// A range that starts late, for a method whose iterations depend on earlier ones.
+    #[error(
+        "{method} carries state from one iteration to the next, so iterations {start}.. cannot be rendered alone: \
+         render from 0 and go on with `isophote resume`"
+    )]
+    Stateful {
+        /// The method's name.
+        method: String,
+        /// First iteration asked for.
+        start: u64,
+    },
+}
+
+/// Further layers of the EXR.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layers {
+    /// `variance.R`, `variance.G`, `variance.B`: variance of the mean image.
+    pub variance: bool,
+    /// `count.Y`: camera-side samples of the pixel.
+    pub count: bool,
+}
+
+/// What is written, and where.
+#[derive(Clone, Debug)]
+pub struct Output {
+    /// The EXR.
+    pub path: PathBuf,
+    /// Further layers.
+    pub layers: Layers,
+    /// A PNG to look at.
+    pub preview: Option<(PathBuf, Exposure)>,
+}
+
+impl Output {
+    /// Writes a film.
+    fn write(&self, path: &Path, film: &Film, metadata: &Metadata) -> Result<(), ImageError> {
+        let picture = Picture::new(film.width(), film.height(), film.mean());
+        let mut planes = Vec::new();
+        if self.layers.variance {
+            // Of one iteration no variance is known; NaN says so.
+            let unknown = || vec![Rgb::splat(f32::NAN); picture.pixels.len()];
+            planes.push(Plane::Colour("variance", film.variance_of_mean().unwrap_or_else(unknown)));
+        }
+        if self.layers.count {
+            planes.push(Plane::Scalar("count", vec![film.eye_count() as f32; picture.pixels.len()]));
+        }
+        let metadata = serde_json::to_value(metadata).map_err(|e| ImageError::content(path, e.to_string()))?;
+        exr::write(path, &picture, &planes, Some(&metadata))?;
+        match &self.preview {
+            Some((preview, exposure)) if path == self.path => write_png(preview, &picture, *exposure),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A picture to measure against.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Where it came from.
+    pub path: PathBuf,
+    /// Itself.
+    pub picture: Picture,
+}
+
+/// All a render is told beside the method.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// Width and height in pixels.
+    pub size: (usize, usize),
+    /// When to stop.
+    pub budget: Budget,
+    /// Seed, for the record.
+    pub seed: u64,
+    /// Which films to keep.
+    pub snapshots: Snapshots,
+    /// Seconds of wall time between saves of the unfinished image.
+    pub checkpoint: Option<Duration>,
+    /// Reference of the error record.
+    pub reference: Option<Reference>,
+    /// What to write.
+    pub output: Output,
+}
+
+/// What came of a render.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The film.
+    pub film: Film,
+    /// As written.
+    pub metadata: Metadata,
+    /// Pixels of the image with a component that is infinite or NaN.
+    pub non_finite: u64,
+    /// The signal that ended it early.
+    pub interrupted: Option<i32>,
+}
+
+/// Prepares, iterates, saves. `metadata` says what is rendered; the rest of it is filled in here.
+///
+/// If something fails on the way, what is rendered is saved before the error is returned. A render interrupted before its first iteration
+/// writes nothing.
+pub fn render(
+    method: &mut dyn Integrator,
+    plan: &Plan,
+    metadata: Metadata,
+    progress: &mut dyn Progress,
+    interrupt: &Interrupt,
+) -> Result<Outcome, RenderError> {
+    if let Some(Reference { path, picture }) = &plan.reference
+        && picture.size() != plan.size
+    {
+        let source = SizeMismatch { image: plan.size, reference: picture.size() };
+        return Err(RenderError::Reference { path: path.clone(), source });
+    }
+    let start = plan.budget.iterations.start;
+    if start > 0 && !method.stateless() {
+        return Err(RenderError::Stateful { method: metadata.method, start });
+    }
+    let film = Film::new(plan.size.0, plan.size.1, plan.output.layers.variance);
+    let mut session = Session { plan, film, metadata, clock: RenderClock::default(), stats: IterationStats::default(), done: 0 };
+    let result = session.iterate(method, progress, interrupt);
+    progress.finish();
+    let saved = if session.done > 0 { session.record().and_then(|()| session.save(&plan.output.path)) } else { Ok(()) };
+    let interrupted = result?;
+    saved?;
+    let non_finite = session.film.mean().iter().filter(|p| !p.is_finite()).count() as u64;
+    Ok(Outcome { film: session.film, metadata: session.metadata, non_finite, interrupted })
+}
+
+/// A render in progress.
+struct Session<'a> {
+    plan: &'a Plan,
+    film: Film,
+    metadata: Metadata,
+    clock: RenderClock,
+    stats: IterationStats,
+    done: u64,
+}
+
+impl Session<'_> {
+    /// Runs to the end of the budget, or to the signal that it returns.
+    fn iterate(
+        &mut self,
+        method: &mut dyn Integrator,
+        progress: &mut dyn Progress,
+        interrupt: &Interrupt,
+    ) -> Result<Option<i32>, RenderError> {
+        if let Some(signal) = interrupt.signal() {
+            return Ok(Some(signal));
+        }
+        progress.step(self.step());
+        let prepared = self.clock.time(|| method.prepare())?;
+        self.stats.add(&prepared);
+        self.metadata.radius = method.radius();
+        let mut last_save = Instant::now();
+        for i in self.plan.budget.iterations.clone() {
+            if self.done > 0 && self.out_of_time() {
+                break;
+            }
+            if let Some(signal) = interrupt.signal() {
+                return Ok(Some(signal));
+            }
+            let film = &mut self.film;
+            let stats = self.clock.time(|| {
+                let stats = method.iterate(i, film);
+                film.finish_iteration();
+                stats
+            });
+            self.stats.add(&stats);
+            self.done += 1;
+            progress.step(self.step());
+            self.keep()?;
+            if self.plan.checkpoint.is_some_and(|every| last_save.elapsed() >= every) {
+                if let Err(error) = self.save(&self.plan.output.path.clone()) {
+                    // The render can still end well; only the insurance is missing.
+                    tracing::warn!("checkpoint not written: {error}");
+                }
+                last_save = Instant::now();
+            }
+        }
+        Ok(None)
+    }
+
+    /// A snapshot and an error record, where they are due.
+    fn keep(&mut self) -> Result<(), RenderError> {
+        if self.plan.snapshots.due(self.done) {
+            self.record()?;
+            self.save(&Snapshots::path(&self.plan.output.path, self.done))?;
+        }
+        Ok(())
+    }
+
+    /// Measures against the reference, if that is not done yet for this film.
+    fn record(&mut self) -> Result<(), RenderError> {
+        let Some(Reference { path, picture }) = &self.plan.reference else { return Ok(()) };
+        if self.metadata.errors.last().is_some_and(|record| record.iteration == self.done) {
+            return Ok(());
+        }
+        let image = Picture::new(self.film.width(), self.film.height(), self.film.mean());
+        let pairs = Pairs::new(picture, &image).map_err(|source| RenderError::Reference { path: path.clone(), source })?;
+        self.metadata.errors.push(ErrorRecord::measure(self.done, self.clock.seconds(), &pairs, EPSILON));
+        Ok(())
+    }
+
+    /// Writes the film as it stands.
+    fn save(&mut self, path: &Path) -> Result<(), RenderError> {
+        let start = self.plan.budget.iterations.start;
+        let metadata = &mut self.metadata;
+        metadata.runs = vec![Run { seed: self.plan.seed, ranges: vec![[start, start + self.done]] }];
+        metadata.seconds = self.clock.seconds();
+        metadata.cpu_seconds = self.clock.cpu_seconds();
+        metadata.threads = rayon::current_num_threads();
+        metadata.light_paths = self.stats.light_paths;
+        metadata.camera_paths = self.stats.camera_paths;
+        metadata.rays = self.stats.rays;
+        metadata.rejected = self.stats.rejected.iter().map(|(cause, count)| (cause.to_string(), *count)).collect();
+        Ok(self.plan.output.write(path, &self.film, &self.metadata)?)
+    }
+
+    fn out_of_time(&self) -> bool {
+        self.plan.budget.time.is_some_and(|limit| self.clock.seconds() >= limit)
+    }
+
+    fn step(&self) -> Step {
+        Step { done: self.done, total: self.plan.budget.total(), seconds: self.clock.seconds(), limit: self.plan.budget.time }
+    }
+}
+
+#[cfg(test)]
+mod tests;
