@@ -72,8 +72,6 @@ pub struct Bvh {
     analytic: Vec<Analytic>,
     /// How to reach the first node; `node::EMPTY` for no primitives at all.
     root: u32,
-    /// Entries the walk's stack needs in the worst case.
-    stack: usize,
     /// Largest absolute coordinate of the bounds: what rounding errors are measured against.
     reach: f32,
     bounds: Option<Bounds>,

@@ -97,23 +97,20 @@ fn axis_parallel_rays_on_node_boundaries_do_not_leak() {
         moved.corners.iter_mut().for_each(|c| *c += shift);
         let bvh = Bvh::build(&triangles(&moved));
         for axis in 0..3 {
-            for i in 0..=n {
-                for j in 0..=n {
+            for i in 1..n {
+                for j in 1..n {
                     for zero in [0.0, -0.0, 1e-40, -1e-40, 1e-12] {
                         for (towards, nudge) in [(1.0, 0), (-1.0, 0), (1.0, 1), (-1.0, -1)] {
                             let mut o = Vec3::splat(5.25);
                             o[(axis + 1) % 3] = i as f32;
                             o[(axis + 2) % 3] = j as f32;
                             o += shift;
-                            // One ulp inside or outside only where that is still inside the box.
-                            if i > 0 && i < n {
-                                let x = &mut o[(axis + 1) % 3];
-                                *x = match nudge {
-                                    1 => x.next_up(),
-                                    -1 => x.next_down(),
-                                    _ => *x,
-                                };
-                            }
+                            let x = &mut o[(axis + 1) % 3];
+                            *x = match nudge {
+                                1 => x.next_up(),
+                                -1 => x.next_down(),
+                                _ => *x,
+                            };
                             let mut d = Vec3::splat(zero);
                             d[axis] = towards;
                             let ray = Ray::new(o, d);
