@@ -1,7 +1,21 @@
-//! The ray accelerator. The only file that names obvhs.
+//! The ray accelerator: an eight-wide tree over triangles, spheres, disks and cylinders.
+//!
+//! [`Bvh::build`] makes it, [`Accel`] asks it. How it works, what it promises at the last bit and what was measured
+//! stand in `docs/rays.md`.
+
+mod analytic;
+mod build;
+mod node;
+mod probe;
+mod traverse;
+mod tree;
+mod triangle;
 
 use super::ray::{RawHit, Ray};
+use analytic::Analytic;
 use glam::{Affine3A, Vec3};
+use node::Node;
+use triangle::Tri4;
 
 /// What the accelerator can intersect. The index in the list is the primitive's number.
 #[derive(Clone, Copy, Debug)]
@@ -33,4 +47,74 @@ pub trait Accel {
     fn closest(&self, ray: &Ray) -> Option<RawHit>;
     /// Is there any hit with `0 < t <= ray.t_max`?
     fn occluded(&self, ray: &Ray) -> bool;
+}
+
+/// An axis-aligned box, `min <= max` in every component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Smallest corner, world units.
+    pub min: Vec3,
+    /// Largest corner, world units.
+    pub max: Vec3,
+}
+
+/// The eight-wide tree. Immutable, shared by all threads.
+///
+/// Primitives that no ray can hit are left out when it is built: those with a coordinate that is not finite, triangles
+/// without area, spheres without a positive radius, disks and cylinders whose map is singular. The others keep the
+/// numbers they had in the list.
+pub struct Bvh {
+    /// Inner nodes, each before its descendants, so that a walk goes forward in memory.
+    nodes: Vec<Node>,
+    /// Triangle leaves, in the order the walk meets them.
+    triangles: Vec<Tri4>,
+    /// Leaves of everything that is no triangle, one a leaf.
+    analytic: Vec<Analytic>,
+    /// How to reach the first node; `node::EMPTY` for no primitives at all.
+    root: u32,
+    /// Entries the walk's stack needs in the worst case.
+    stack: usize,
+    /// Largest absolute coordinate of the bounds: what rounding errors are measured against.
+    reach: f32,
+    bounds: Option<Bounds>,
+    primitives: usize,
+}
+
+/// Stack entries when the tree is of usual depth: a million triangles need about 50.
+const SHALLOW: usize = 64;
+/// Stack entries for any tree at all: `build` sees to it that none needs more.
+const DEEP: usize = 512;
+
+impl Bvh {
+    /// Builds the tree. The same list gives the same tree, bit for bit. Up to 2^30 primitives.
+    pub fn build(primitives: &[Primitive]) -> Self {
+        build::build(primitives)
+    }
+
+    /// The smallest box around everything that can be hit; none if nothing can.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.bounds
+    }
+
+    /// How many of the primitives can be hit.
+    pub fn primitives(&self) -> usize {
+        self.primitives
+    }
+
+    /// Bytes held, the struct itself not counted.
+    pub fn memory(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+            + self.triangles.capacity() * size_of::<Tri4>()
+            + self.analytic.capacity() * size_of::<Analytic>()
+    }
+}
+
+impl Accel for Bvh {
+    fn closest(&self, ray: &Ray) -> Option<RawHit> {
+        if self.stack <= SHALLOW { self.closest_within::<SHALLOW>(ray) } else { self.closest_within::<DEEP>(ray) }
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        if self.stack <= SHALLOW { self.occluded_within::<SHALLOW>(ray) } else { self.occluded_within::<DEEP>(ray) }
+    }
 }

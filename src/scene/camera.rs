@@ -375,10 +375,11 @@ fn check(description: &CameraDescription, film: &FilmSpec) -> Result<(), CameraE
     if !description.principal_point_offset.is_finite() {
         return Err(CameraError::PrincipalPoint);
     }
-    if let Some(ThinLens { aperture_radius: radius, focus_distance: focus }) = description.lens {
-        if !(radius > 0.0 && radius.is_finite() && focus > 0.0 && focus.is_finite()) {
-            return Err(CameraError::Lens { radius, focus });
-        }
+    let positive = |x: f32| x > 0.0 && x.is_finite();
+    if let Some(ThinLens { aperture_radius: radius, focus_distance: focus }) = description.lens
+        && !(positive(radius) && positive(focus))
+    {
+        return Err(CameraError::Lens { radius, focus });
     }
     let ([film_width, film_height], [x, y], [width, height]) = (film.size, film.crop_offset, film.crop_size);
     let fits = |offset: u32, size: u32, whole: u32| size > 0 && offset.checked_add(size).is_some_and(|end| end <= whole);
@@ -387,6 +388,3 @@ fn check(description: &CameraDescription, film: &FilmSpec) -> Result<(), CameraE
     }
     Ok(())
 }
-
-#[cfg(test)]
-mod tests;

@@ -13,13 +13,16 @@ pub mod ray;
 pub mod shape;
 pub mod texture;
 
+use crate::math::Rgb;
+use accel::Accel;
 use bsdf::Bsdf;
-use camera::Camera;
-use emitter::{DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter};
+use camera::{Camera, CameraConnection, CameraError, FilmSpec};
+use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterKind, Emitters};
 use glam::{Vec2, Vec3};
 use hit::{Endpoint, Hit};
 use ray::Ray;
-use shape::Shape;
+use shape::surface::{self, Surfaces};
+use shape::{Geometry, Shape};
 
 /// Number of a shape in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -83,89 +86,201 @@ pub enum SceneError {
     TooLarge(usize),
 }
 
+/// The ray accelerator in use.
+type Tree = accel::Bvh;
+
 /// Everything light can meet. Built by [`mitsuba`] or by hand; immutable.
 pub struct Scene {
+    tree: Tree,
+    surfaces: Surfaces,
+    emitters: Emitters,
     bsdfs: Vec<Bsdf>,
-    emitters: Vec<Emitter>,
     camera: Camera,
+    shapes: Vec<ShapeInfo>,
+    ball: Ball,
+}
+
+/// A shape as the built scene remembers it.
+#[derive(Clone, Debug)]
+pub struct ShapeInfo {
+    /// As the description has it.
+    pub name: String,
+    /// What kind of surface: `mesh`, `sphere`, `disk` or `cylinder`.
+    pub kind: &'static str,
+    /// Its primitives, as the accelerator counts them.
+    pub primitives: std::ops::Range<u32>,
+    /// Its material.
+    pub bsdf: BsdfId,
+    /// Its emitter, if it shines.
+    pub emitter: Option<EmitterId>,
+}
+
+/// What a scene holds, by number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneCounts {
+    /// Shapes.
+    pub shapes: usize,
+    /// Triangles of all meshes.
+    pub triangles: usize,
+    /// Spheres, disks and cylinders.
+    pub quadrics: usize,
+    /// Materials.
+    pub bsdfs: usize,
+    /// Emitters.
+    pub emitters: usize,
+}
+
+/// Bytes a scene holds, by part; textures and materials are not in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SceneMemory {
+    /// The ray accelerator.
+    pub accelerator: usize,
+    /// Surfaces as hits need them.
+    pub surfaces: usize,
+    /// Emitters with their tables and images.
+    pub emitters: usize,
 }
 
 impl Scene {
     /// Checks the parts, builds the accelerator and the tables of the emitters.
     pub fn build(parts: SceneParts) -> Result<Self, SceneError> {
-        Ok(Self { bsdfs: parts.bsdfs, emitters: parts.emitters, camera: parts.camera })
+        let SceneParts { shapes, bsdfs, emitters, camera } = parts;
+        check(&shapes, &bsdfs, &emitters)?;
+        // --- surfaces, and which of them shine
+        let mut surfaces = Surfaces::default();
+        let mut primitives = Vec::new();
+        let mut list: Vec<Emitter> = Vec::new();
+        let mut infos = Vec::with_capacity(shapes.len());
+        for (number, shape) in shapes.into_iter().enumerate() {
+            let Shape { name, geometry, bsdf, radiance } = shape;
+            let first = surfaces.len();
+            let id = radiance.is_some().then_some(EmitterId(list.len() as u32));
+            let tangents = bsdfs[bsdf.0 as usize].anisotropic();
+            surfaces.push(&geometry, bsdf, id, tangents, &mut primitives);
+            list.extend(radiance.map(|r| Emitter::Area(Area::new(ShapeId(number as u32), r, first..surfaces.len(), &surfaces))));
+            let primitives = first as u32..surfaces.len() as u32;
+            infos.push(ShapeInfo { name, kind: geometry.kind(), primitives, bsdf, emitter: id });
+        }
+        list.extend(emitters);
+        // --- the tree, and the ball around what it holds
+        let tree = Tree::build(&primitives);
+        let ball = tree.bounds().map(|b| Ball::around(b.min, b.max)).unwrap_or_default();
+        let emitters = Emitters::new(list, ball, &surfaces).map_err(|(number, source)| SceneError::Emitter { number, source })?;
+        Ok(Self { tree, surfaces, emitters, bsdfs, camera, shapes: infos, ball })
     }
 
     /// The closest hit.
+    #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let _ = ray;
-        None
+        self.tree.closest(ray).map(|raw| self.surfaces.hit(ray, &raw))
     }
 
     /// Is anything between two points?
+    #[inline]
     pub fn occluded(&self, a: &Endpoint, b: &Endpoint) -> bool {
-        let _ = (a, b);
-        false
+        let segment = a.segment(b);
+        segment.d != Vec3::ZERO && self.tree.occluded(&segment)
     }
 
     /// Is anything on the endless ray from `a` along `d`?
+    #[inline]
     pub fn occluded_ray(&self, a: &Endpoint, d: Vec3) -> bool {
-        let _ = (a, d);
-        false
+        self.tree.occluded(&a.ray(d))
+    }
+
+    /// Can the point `from` see a light sample?
+    #[inline]
+    pub fn visible(&self, from: &Endpoint, sample: &DirectSample) -> bool {
+        match sample.kind {
+            EmitterKind::Surface | EmitterKind::DeltaPosition => !self.occluded(from, &sample.end),
+            EmitterKind::DeltaDirection | EmitterKind::Infinite => !self.occluded_ray(from, sample.wi),
+        }
+    }
+
+    /// Can the camera see the point that a connection was made from?
+    #[inline]
+    pub fn camera_sees(&self, from: &Endpoint, connection: &CameraConnection) -> bool {
+        !self.occluded(from, &connection.near)
     }
 
     /// A light sample as seen from `from`, emitters chosen by power; `u_pick` chooses the emitter, `u` the point on it. `None` if the light
     /// chosen sends nothing there: an estimate of zero.
+    #[inline]
     pub fn sample_direct(&self, from: Vec3, u_pick: f32, u: Vec2) -> Option<DirectSample> {
-        let _ = (from, u_pick, u);
-        None
+        self.emitters.sample_direct(&self.surfaces, from, u_pick, u)
     }
 
     /// A ray of light, emitters chosen by power. `None` for a sample that carries nothing, and in a scene without light.
+    #[inline]
     pub fn sample_emission(&self, u_pick: f32, u_position: Vec2, u_direction: Vec2) -> Option<EmissionSample> {
-        let _ = (u_pick, u_position, u_direction);
-        None
+        self.emitters.sample_emission(&self.surfaces, u_pick, u_position, u_direction)
     }
 
     /// What `hit` emits along `wo` (unit, away from the surface) towards `from`, the point it was seen from; black if it does not shine there.
+    #[inline]
     pub fn emitted(&self, hit: &Hit, wo: Vec3, from: Vec3) -> Emitted {
-        let _ = (hit, wo, from);
-        Emitted::default()
+        self.emitters.emitted(&self.surfaces, hit, wo, from)
     }
 
-    /// What arrives from infinity at `from` along a ray of unit direction `d` that left the scene.
-    pub fn escaped(&self, d: Vec3, from: Vec3) -> Emitted {
-        let _ = (d, from);
-        Emitted::default()
+    /// What arrives from infinity along a ray of unit direction `d` that left the scene.
+    #[inline]
+    pub fn escaped(&self, d: Vec3) -> Emitted {
+        self.emitters.escaped(d)
     }
 
-    /// Densities with which emission sampling leaves `hit` along `d`; zero where it does not.
+    /// Densities with which emission sampling leaves `hit` along `d` (unit, away from the surface); zero where it does not.
+    #[inline]
     pub fn emission_pdf(&self, hit: &Hit, d: Vec3) -> EmissionPdf {
-        let _ = (hit, d);
-        EmissionPdf::default()
+        self.emitters.emission_pdf(hit, d)
     }
 
     /// Densities with which emission sampling follows a light sample, from the light to the point that saw it.
+    #[inline]
     pub fn emission_pdf_direct(&self, sample: &DirectSample) -> EmissionPdf {
-        let _ = sample;
-        EmissionPdf::default()
+        self.emitters.emission_pdf_direct(sample)
     }
 
-    /// Densities with which emission sampling sends light from infinity along `-d`, for a ray of direction `d` that left the scene.
+    /// Densities with which emission sampling sends light from infinity along `-d`, for a ray of unit direction `d` that left the scene.
+    #[inline]
     pub fn emission_pdf_escaped(&self, d: Vec3) -> EmissionPdf {
-        let _ = d;
-        EmissionPdf::default()
+        self.emitters.emission_pdf_escaped(d)
     }
 
-    /// Can the point `from` see a light sample?
-    pub fn visible(&self, from: &Endpoint, sample: &DirectSample) -> bool {
-        let _ = (from, sample);
-        true
+    /// Probability with which an emitter is chosen, by direct and by emission sampling.
+    #[inline]
+    pub fn pick_probability(&self, emitter: EmitterId) -> f32 {
+        self.emitters.pick_probability(emitter)
+    }
+
+    /// Flux that an emitter sends into the scene, W; that of one at infinity is what passes the scene's bounding sphere.
+    pub fn power(&self, emitter: EmitterId) -> Rgb {
+        self.emitters.power(emitter)
+    }
+
+    /// Every emitter; an [`EmitterId`] is an index into this list. Shapes that shine come first, in their order.
+    pub fn emitters(&self) -> &[Emitter] {
+        self.emitters.list()
+    }
+
+    /// The emitter that surrounds the scene, if there is one.
+    pub fn environment(&self) -> Option<EmitterId> {
+        self.emitters.environment()
     }
 
     /// The material of a shape.
+    #[inline]
     pub fn bsdf(&self, shape: ShapeId) -> &Bsdf {
-        &self.bsdfs[shape.0 as usize]
+        &self.bsdfs[self.surfaces.bsdf(shape).0 as usize]
+    }
+
+    /// Every material; a [`BsdfId`] is an index into this list.
+    pub fn bsdfs(&self) -> &[Bsdf] {
+        &self.bsdfs
+    }
+
+    /// Every shape; a [`ShapeId`] is an index into this list.
+    pub fn shapes(&self) -> &[ShapeInfo] {
+        &self.shapes
     }
 
     /// The sensor.
@@ -173,8 +288,64 @@ impl Scene {
         &self.camera
     }
 
-    /// Every emitter; an [`EmitterId`] is an index into this list. Shapes that shine come first, in their order.
-    pub fn emitters(&self) -> &[Emitter] {
-        &self.emitters
+    /// Gives the camera another film: another resolution, another window.
+    pub fn set_film(&mut self, film: FilmSpec) -> Result<(), CameraError> {
+        self.camera = self.camera.with_film(film)?;
+        Ok(())
+    }
+
+    /// The smallest box around all surfaces; `None` without any.
+    pub fn bounds(&self) -> Option<accel::Bounds> {
+        self.tree.bounds()
+    }
+
+    /// Centre and radius of a sphere around all surfaces; radius 0 without any.
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        (self.ball.center, self.ball.radius)
+    }
+
+    /// What the scene holds.
+    pub fn counts(&self) -> SceneCounts {
+        let quadrics = self.surfaces.quadrics();
+        SceneCounts {
+            shapes: self.shapes.len(),
+            triangles: self.surfaces.len() - quadrics,
+            quadrics,
+            bsdfs: self.bsdfs.len(),
+            emitters: self.emitters.list().len(),
+        }
+    }
+
+    /// What that takes.
+    pub fn memory(&self) -> SceneMemory {
+        SceneMemory { accelerator: self.tree.memory(), surfaces: self.surfaces.memory(), emitters: self.emitters.memory() }
     }
 }
+
+/// Everything that can be wrong with the parts together.
+fn check(shapes: &[Shape], bsdfs: &[Bsdf], emitters: &[Emitter]) -> Result<(), SceneError> {
+    let mut primitives = 0;
+    for shape in shapes {
+        let name = || shape.name.clone();
+        if shape.bsdf.0 as usize >= bsdfs.len() {
+            return Err(SceneError::NoSuchBsdf { name: name(), bsdf: shape.bsdf.0, count: bsdfs.len() });
+        }
+        if let Geometry::Mesh(mesh) = &shape.geometry {
+            mesh.check().map_err(|source| SceneError::Shape { name: name(), source })?;
+            primitives += mesh.triangles.len();
+        } else {
+            primitives += 1;
+        }
+    }
+    if primitives > surface::MOST {
+        return Err(SceneError::TooLarge(primitives));
+    }
+    let environments = emitters.iter().filter(|e| e.kind() == EmitterKind::Infinite).count();
+    if environments > 1 {
+        return Err(SceneError::Environments(environments));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

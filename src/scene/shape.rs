@@ -38,6 +38,18 @@ pub enum Geometry {
     Cylinder(Cylinder),
 }
 
+impl Geometry {
+    /// The kind's name.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Geometry::Mesh(_) => "mesh",
+            Geometry::Sphere(_) => "sphere",
+            Geometry::Disk(_) => "disk",
+            Geometry::Cylinder(_) => "cylinder",
+        }
+    }
+}
+
 /// A shape that cannot be rendered as described.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ShapeError {

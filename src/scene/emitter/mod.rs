@@ -126,6 +126,9 @@ pub enum EmitterError {
         /// Pixels given.
         found: usize,
     },
+    /// The sphere of directions is stretched.
+    #[error("an envmap's to_world must rotate, not stretch or shear")]
+    EnvmapTransform,
     /// A pixel is negative or not finite.
     #[error("envmap pixel ({x}, {y}) is {value:?}: radiance must be finite and not negative")]
     EnvmapPixel {
@@ -151,9 +154,11 @@ mod distant;
 mod envmap;
 mod point;
 mod spot;
+mod table;
 
 pub use area::Area;
 pub use distant::{Constant, Directional};
 pub use envmap::Envmap;
 pub use point::Point;
 pub use spot::Spot;
+pub(super) use table::{Ball, Emitters};

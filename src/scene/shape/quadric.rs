@@ -1,8 +1,12 @@
 //! Spheres, disks and cylinders as described: a map from a unit shape.
 
 use super::ShapeError;
-use crate::math::Frame;
-use glam::{Affine3A, DAffine3, DMat3, Mat3A, Vec3, Vec3A};
+use super::surface::SurfacePoint;
+use crate::math::{Frame, warp};
+use crate::scene::accel::Primitive;
+use crate::scene::hit::Endpoint;
+use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Vec2, Vec3, Vec3A};
+use std::f64::consts::{PI, TAU};
 
 /// How far a column's length or angle may be from what a similarity has: the rounding of a product of a few f32 matrices.
 const SIMILARITY: f64 = 1e-4;
@@ -94,10 +98,10 @@ fn columns(to_world: &Affine3A) -> Result<[Vec3A; 3], ShapeError> {
         return Err(ShapeError::NotFinite("to_world"));
     }
     let m = to_world.matrix3;
-    let volume = DMat3::from(DAffine3::from_mat4(glam::Mat4::from(*to_world).as_dmat4()).matrix3).determinant();
+    let volume = double(to_world).matrix3.determinant();
     let cube = f64::from(m.x_axis.length()) * f64::from(m.y_axis.length()) * f64::from(m.z_axis.length());
     // A map that keeps less than rounding leaves of its columns' volume has no inverse worth the name.
-    if !(volume.abs() > f64::from(f32::EPSILON) * cube) {
+    if volume.abs() <= f64::from(f32::EPSILON) * cube {
         return Err(ShapeError::NoExtent);
     }
     Ok([m.x_axis, m.y_axis, m.z_axis])
@@ -112,4 +116,160 @@ fn similar(a: Vec3A, b: Vec3A) -> bool {
 /// Two columns at right angles.
 fn orthogonal(a: Vec3A, b: Vec3A) -> bool {
     f64::from(a.dot(b)).abs() <= SIMILARITY * f64::from(a.length()) * f64::from(b.length())
+}
+
+/// A map in double precision.
+fn double(map: &Affine3A) -> DAffine3 {
+    let m = map.matrix3;
+    let columns = [m.x_axis, m.y_axis, m.z_axis].map(|c| Vec3::from(c).as_dvec3());
+    DAffine3 { matrix3: DMat3::from_cols(columns[0], columns[1], columns[2]), translation: Vec3::from(map.translation).as_dvec3() }
+}
+
+/// A sphere, disk or cylinder as hits and samples need it, in f64: what is left of the error is the rounding of the result.
+#[derive(Clone, Debug)]
+pub(in crate::scene) struct Quadric {
+    kind: Kind,
+    /// The unit shape to world, and back.
+    to_world: DAffine3,
+    to_object: DAffine3,
+    /// The normal is turned against the unit shape's outward (upward) one.
+    flipped: bool,
+    primitive: Primitive,
+}
+
+/// The unit shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    /// World-space centre and radius: exactly the accelerator's.
+    Sphere {
+        center: DVec3,
+        radius: f64,
+    },
+    Disk,
+    Cylinder,
+}
+
+impl Quadric {
+    pub(super) fn sphere(sphere: &Sphere) -> Self {
+        let (center, radius) = (sphere.center(), sphere.radius());
+        let kind = Kind::Sphere { center: center.as_dvec3(), radius: f64::from(radius) };
+        Self::new(kind, &sphere.to_world, sphere.inward, Primitive::Sphere { center, radius })
+    }
+
+    pub(super) fn disk(disk: &Disk) -> Self {
+        Self::new(Kind::Disk, &disk.to_world, disk.flip_normals, Primitive::Disk { to_world: disk.to_world })
+    }
+
+    pub(super) fn cylinder(cylinder: &Cylinder) -> Self {
+        Self::new(Kind::Cylinder, &cylinder.to_world, cylinder.flip_normals, Primitive::Cylinder { to_world: cylinder.to_world })
+    }
+
+    fn new(kind: Kind, to_world: &Affine3A, flipped: bool, primitive: Primitive) -> Self {
+        let to_world = double(to_world);
+        Self { kind, to_world, to_object: to_world.inverse(), flipped, primitive }
+    }
+
+    pub(super) fn primitive(&self) -> Primitive {
+        self.primitive
+    }
+
+    /// Centre and radius, if it is a sphere whose normals point outwards.
+    #[inline]
+    pub(in crate::scene) fn outward_sphere(&self) -> Option<(DVec3, f64)> {
+        match self.kind {
+            Kind::Sphere { center, radius } if !self.flipped => Some((center, radius)),
+            _ => None,
+        }
+    }
+
+    /// Area, world units squared.
+    pub(super) fn area(&self) -> f64 {
+        let m = self.to_world.matrix3;
+        match self.kind {
+            Kind::Sphere { radius, .. } => 4.0 * PI * radius * radius,
+            Kind::Disk => PI * m.x_axis.cross(m.y_axis).length(),
+            Kind::Cylinder => PI * (m.x_axis.length() + m.y_axis.length()) * m.z_axis.length(),
+        }
+    }
+
+    /// The surface at the point nearest to `near`, which is on it up to rounding.
+    pub(super) fn surface(&self, near: DVec3, tangents: bool) -> (SurfacePoint, Frame) {
+        let local = self.to_object.transform_point3(near);
+        let local = match self.kind {
+            Kind::Sphere { .. } => local.normalize_or(DVec3::Z),
+            Kind::Disk => local.with_z(0.0),
+            Kind::Cylinder => local.truncate().normalize_or(glam::DVec2::X).extend(local.z),
+        };
+        let point = self.at(local);
+        let frame = if tangents { Frame::from_normal_and_tangent(point.n_s, self.dp_du(local)) } else { Frame::from_normal(point.n_s) };
+        (point, frame)
+    }
+
+    /// A point, uniform by area.
+    pub(super) fn sample(&self, u: Vec2) -> SurfacePoint {
+        let local = match self.kind {
+            Kind::Sphere { .. } => {
+                let z = 1.0 - 2.0 * f64::from(u.x);
+                let (sin, cos) = (TAU * f64::from(u.y)).sin_cos();
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                DVec3::new(r * cos, r * sin, z)
+            }
+            Kind::Disk => warp::disk(u).as_dvec2().extend(0.0),
+            Kind::Cylinder => {
+                let (sin, cos) = (TAU * f64::from(u.x)).sin_cos();
+                DVec3::new(cos, sin, f64::from(u.y))
+            }
+        };
+        self.at(local)
+    }
+
+    /// The point of a sphere in this unit direction from its centre.
+    pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> SurfacePoint {
+        self.at(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
+    }
+
+    /// The point at a position of the unit shape.
+    fn at(&self, local: DVec3) -> SurfacePoint {
+        let m = self.to_world.matrix3;
+        let (p, n) = match self.kind {
+            Kind::Sphere { center, radius } => {
+                let n = self.to_world.transform_vector3(local).normalize_or(DVec3::Z);
+                (center + n * radius, n)
+            }
+            Kind::Disk => {
+                // Upward under the inverse transpose: a mirroring map does not turn it, as in Mitsuba.
+                let up = m.x_axis.cross(m.y_axis).normalize_or(DVec3::Z);
+                (self.to_world.transform_point3(local), up * 1f64.copysign(up.dot(m.z_axis)))
+            }
+            Kind::Cylinder => {
+                let outward = self.to_world.transform_vector3(local.with_z(0.0));
+                (self.to_world.transform_point3(local), outward.normalize_or(DVec3::Z))
+            }
+        };
+        let n = if self.flipped { -n } else { n }.as_vec3();
+        let p32 = p.as_vec3();
+        // Half an ulp in each coordinate, and as much again for the normal's own rounding; the f64 work adds nothing at this scale.
+        let offset = f32::EPSILON * p32.abs().dot(n.abs());
+        SurfacePoint { end: Endpoint { p: p32, n_g: n, offset }, n_s: n, uv: self.uv(local) }
+    }
+
+    /// Texture coordinates at a position of the unit shape, as Mitsuba has them.
+    fn uv(&self, local: DVec3) -> Vec2 {
+        let turn = local.y.atan2(local.x) / TAU;
+        let azimuth = (if turn < 0.0 { turn + 1.0 } else { turn }) as f32;
+        match self.kind {
+            Kind::Sphere { .. } => Vec2::new(azimuth, (local.truncate().length().atan2(local.z) / PI) as f32),
+            Kind::Disk => Vec2::new(local.truncate().length() as f32, azimuth),
+            Kind::Cylinder => Vec2::new(azimuth, local.z as f32),
+        }
+    }
+
+    /// Direction in which the first texture coordinate grows; zero at a sphere's poles.
+    fn dp_du(&self, local: DVec3) -> Vec3 {
+        let along = match self.kind {
+            Kind::Disk => local.truncate().normalize_or(glam::DVec2::X).extend(0.0),
+            Kind::Sphere { .. } | Kind::Cylinder => DVec3::new(-local.y, local.x, 0.0),
+        };
+        self.to_world.transform_vector3(along).as_vec3()
+    }
 }

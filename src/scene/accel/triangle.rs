@@ -1,0 +1,158 @@
+//! Four triangles side by side, tested without cracks between neighbours.
+//!
+//! [WOOP] S. Woop, C. Benthin, I. Wald: Watertight Ray/Triangle Intersection. JCGT 2(1), 2013.
+
+use super::probe::Probe;
+use glam::{DVec3, Vec3};
+use wide::f32x4;
+
+/// Closer to the origin than this part of the triangle's extent along the ray, the sign of `t` is checked in f64.
+const DOUBTFUL: f32 = 32.0 / (1 << 24) as f32;
+
+/// Up to four triangles: three cache lines, one a corner. Absent ones are NaN throughout and never hit.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(super) struct Tri4 {
+    /// `corner[i][axis]`, four triangles at once; `corner[0][3]` holds the bits of the primitives' numbers.
+    corner: [[f32x4; 4]; 3],
+}
+
+/// What the four lanes found; only lanes in the mask are meaningful.
+pub(super) struct Four {
+    t: [f32; 4],
+    u: [f32; 4],
+    v: [f32; 4],
+    doubtful: u32,
+}
+
+/// One hit, `t` in the probe's scaled direction.
+#[derive(Clone, Copy)]
+pub(super) struct Best {
+    pub(super) t: f32,
+    pub(super) u: f32,
+    pub(super) v: f32,
+    pub(super) prim: u32,
+}
+
+impl Best {
+    /// Takes the nearer hit; of two equally near ones the lower number, so that the walk's order does not show.
+    #[inline(always)]
+    pub(super) fn improve(&mut self, t: f32, u: f32, v: f32, prim: u32) {
+        if t < self.t || (t == self.t && prim < self.prim) {
+            *self = Self { t, u, v, prim };
+        }
+    }
+}
+
+impl Tri4 {
+    pub(super) fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
+        let lane = |f: &dyn Fn(&(u32, [Vec3; 3])) -> f32| {
+            let mut lanes = [f32::NAN; 4];
+            for (lane, triangle) in lanes.iter_mut().zip(triangles) {
+                *lane = f(triangle);
+            }
+            f32x4::new(lanes)
+        };
+        let corner = [0, 1, 2].map(|i| [lane(&|t| t.1[i].x), lane(&|t| t.1[i].y), lane(&|t| t.1[i].z), lane(&|t| f32::from_bits(t.0))]);
+        Self { corner }
+    }
+
+    /// Which lanes the ray hits with `t <= t_max`, as bits; a lane marked doubtful may have `t <= 0`.
+    #[inline(always)]
+    fn four(&self, p: &Probe, t_max: f32) -> Option<(u32, Four)> {
+        let [x, y, z] = p.axis.map(|k| k & 3);
+        // Corners relative to the origin, sheared so that the ray is the z axis. Neighbours share corners, not edges:
+        // the same corner gives the same numbers in both.
+        let moved = |c: &[f32x4; 4]| {
+            let z = c[z] - p.origin[2];
+            let x = p.shear[0].mul_neg_add(z, c[x] - p.origin[0]);
+            let y = p.shear[1].mul_neg_add(z, c[y] - p.origin[1]);
+            (x, y, z)
+        };
+        let (ax, ay, az) = moved(&self.corner[0]);
+        let (bx, by, bz) = moved(&self.corner[1]);
+        let (cx, cy, cz) = moved(&self.corner[2]);
+        // Products first, rounded, then the difference: rounding is monotonic, so a sign is never wrong, only zero at
+        // worst, and a shared edge walked the other way gives exactly the negative. A fused multiply-add breaks both.
+        let a = cx * by - cy * bx;
+        let b = ax * cy - ay * cx;
+        let c = bx * ay - by * ax;
+        let zero = f32x4::ZERO;
+        let inside = a.fast_min(b).fast_min(c).simd_ge(zero) | a.fast_max(b).fast_max(c).simd_le(zero);
+        if inside.to_bitmask() == 0 {
+            return None;
+        }
+        // A triangle seen edge-on has sum 0 and NaN here, which no comparison below accepts.
+        let scale = f32x4::ONE / (a + b + c);
+        let depth = (a * az + b * bz + c * cz) * scale;
+        let t = depth * p.inv_z;
+        let extent = az.abs().fast_max(bz.abs()).fast_max(cz.abs());
+        let doubtful = depth.abs().simd_le(extent * f32x4::splat(DOUBTFUL));
+        let hit = inside & (doubtful | t.simd_gt(zero)) & t.simd_le(f32x4::splat(t_max));
+        let mask = hit.to_bitmask();
+        (mask != 0).then(|| {
+            let four = Four { t: t.to_array(), u: (b * scale).to_array(), v: (c * scale).to_array(), doubtful: doubtful.to_bitmask() };
+            (mask, four)
+        })
+    }
+
+    #[inline(always)]
+    pub(super) fn closest(&self, p: &Probe, best: &mut Best) {
+        let Some((mut mask, four)) = self.four(p, best.t) else {
+            return;
+        };
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 3;
+            mask &= mask - 1;
+            let mut t = four.t[lane];
+            if four.doubtful >> lane & 1 != 0 {
+                t = self.exactly(p, lane, t);
+                if !(t > 0.0) {
+                    continue;
+                }
+            }
+            best.improve(t, four.u[lane], four.v[lane], self.number(lane));
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn occluded(&self, p: &Probe, t_max: f32) -> bool {
+        let Some((mask, four)) = self.four(p, t_max) else {
+            return false;
+        };
+        if mask & !four.doubtful != 0 {
+            return true;
+        }
+        (0..4).any(|lane| {
+            mask >> lane & 1 != 0 && {
+                let t = self.exactly(p, lane, four.t[lane]);
+                t > 0.0 && t <= t_max
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn number(&self, lane: usize) -> u32 {
+        self.corner[0][3].as_array()[lane].to_bits()
+    }
+
+    fn at(&self, corner: usize, lane: usize) -> DVec3 {
+        let c = &self.corner[corner];
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| f64::from(c[axis].as_array()[lane]));
+        DVec3::new(x, y, z)
+    }
+
+    /// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
+    /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
+    #[cold]
+    #[inline(never)]
+    fn exactly(&self, p: &Probe, lane: usize, t: f32) -> f32 {
+        let a = self.at(0, lane);
+        let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
+        let along = n.dot(p.d.as_dvec3());
+        if along == 0.0 {
+            return t;
+        }
+        (n.dot(a - p.o.as_dvec3()) / along) as f32
+    }
+}

@@ -1,0 +1,2 @@
+//! The ray accelerator against brute force.
+mod shapes;
