@@ -1,3 +1,10 @@
 //! The command line's entry.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match isophote::cli::processor::missing() {
+        None => isophote::cli::run(std::env::args_os()),
+        Some(features) => isophote::cli::processor::refuse(features),
+    }
+}

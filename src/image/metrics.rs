@@ -110,7 +110,7 @@ impl Pairs {
     }
 
     /// Mean of a function of `x` and `r`.
-    fn mean(&self, value: impl Fn(f64, f64) -> f64) -> Measured {
+    pub fn mean(&self, value: impl Fn(f64, f64) -> f64) -> Measured {
         mean_of(self.values.iter().map(|(x, r)| value(*x, *r)), 0)
     }
 }
