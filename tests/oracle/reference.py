@@ -93,6 +93,8 @@ def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=Fa
     w, h = (int(x) for x in film.crop_size())
     per = spp if variant.startswith("scalar") else max(1, min(spp, WAVEFRONT // (w * h)))
     parts = [per] * (spp // per) + ([spp % per] if spp % per else [])
+    if keep:
+        os.makedirs(os.path.dirname(os.path.abspath(keep)), exist_ok=True)
     images, bad, cpu, wall = [], 0, time.process_time(), time.perf_counter()
     for i in range(runs):
         total = np.zeros((h, w, 3))
