@@ -97,7 +97,7 @@ impl Path<'_> {
             let emitted = match &hit {
                 Some(hit) if hit.emitter.is_none() => None,
                 Some(hit) => Some(scene.emitted(hit, -ray.d, from)),
-                None => Some(scene.escaped(ray.d, from)),
+                None => Some(scene.escaped(ray.d)),
             };
             if let Some(emitted) = emitted
                 && counts(depth, &class)

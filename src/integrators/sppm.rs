@@ -167,7 +167,7 @@ impl Sppm<'_> {
         if let Some(escape) = escape
             && counts(escape.depth)
         {
-            emission += escape.throughput * self.scene.escaped(escape.ray.d, escape.ray.o).radiance;
+            emission += escape.throughput * self.scene.escaped(escape.ray.d).radiance;
         }
         (emission, measured)
     }

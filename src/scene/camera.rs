@@ -388,6 +388,3 @@ fn check(description: &CameraDescription, film: &FilmSpec) -> Result<(), CameraE
     }
     Ok(())
 }
-
-#[cfg(test)]
-mod tests;

@@ -11,7 +11,7 @@ use wide::f32x8;
 
 /// What opening a wide node costs against testing one leaf.
 const NODE_COST: f32 = 1.0;
-const LEAF_COST: f32 = 0.6;
+const LEAF_COST: f32 = 0.8;
 /// Triangles a leaf holds.
 const WIDTH: u32 = 4;
 

@@ -130,7 +130,17 @@ pub(super) struct Given<T> {
 impl Plugin {
     pub(super) fn new(kind: Kind, type_name: String, id: Option<String>, position: Position, folders: Arc<[PathBuf]>) -> Self {
         let type_position = position.clone();
-        Self { kind, type_name, id, position, type_position, folders, properties: Vec::new(), children: Vec::new(), asked: RefCell::default() }
+        Self {
+            kind,
+            type_name,
+            id,
+            position,
+            type_position,
+            folders,
+            properties: Vec::new(),
+            children: Vec::new(),
+            asked: RefCell::default(),
+        }
     }
 
     /// `diffuse bsdf`, for messages.
@@ -174,7 +184,10 @@ impl Plugin {
 
     fn get<T>(&self, name: &'static str, expected: &str, take: impl Fn(&Value) -> Option<T>) -> Result<Option<Given<T>>> {
         if let Some(child) = self.children.iter().find(|c| c.name == name) {
-            return Err(SceneError::new(&child.position, format!("\"{name}\" of a {} takes a <{expected}>, no nested object", self.title())));
+            return Err(SceneError::new(
+                &child.position,
+                format!("\"{name}\" of a {} takes a <{expected}>, no nested object", self.title()),
+            ));
         }
         let Some(property) = self.property(name) else { return Ok(None) };
         match take(&property.value) {
@@ -268,7 +281,12 @@ impl Plugin {
 
     /// Parameters and nested objects nobody asked for: those named in `noted` become notes (with the reason why they do not matter),
     /// any other is an error.
-    pub(super) fn finish(&self, noted: &[(&'static str, &'static str)], plugins: &[Plugin], mut note: impl FnMut(&Position, String)) -> Result<()> {
+    pub(super) fn finish(
+        &self,
+        noted: &[(&'static str, &'static str)],
+        plugins: &[Plugin],
+        mut note: impl FnMut(&Position, String),
+    ) -> Result<()> {
         let reason = |name: &str| noted.iter().find(|(known, _)| *known == name).map(|(_, why)| *why);
         for property in self.properties.iter().filter(|p| !p.read.get()) {
             match reason(&property.name) {
@@ -285,7 +303,9 @@ impl Plugin {
                         Kind::Texture => "give the texture a name: the parameter it stands for".to_owned(),
                         _ => format!("it takes {}", self.takes(noted)),
                     };
-                    return Err(SceneError::new(&child.position, format!("a {} has no place for a {}", self.title(), what.title())).help(hint));
+                    return Err(
+                        SceneError::new(&child.position, format!("a {} has no place for a {}", self.title(), what.title())).help(hint)
+                    );
                 }
                 None => return Err(self.unknown(&child.name, &child.position, noted)),
             }
@@ -313,7 +333,10 @@ impl Plugin {
 impl Property {
     /// The error for a parameter given as the wrong element.
     pub(super) fn mismatch(&self, expected: &str) -> SceneError {
-        SceneError::new(&self.value_position, format!("\"{}\" is given as a <{}>, a <{expected}> is expected", self.name, self.value.element()))
+        SceneError::new(
+            &self.value_position,
+            format!("\"{}\" is given as a <{}>, a <{expected}> is expected", self.name, self.value.element()),
+        )
     }
 }
 
@@ -323,6 +346,10 @@ impl<T> Given<T> {
     where
         T: std::fmt::Debug,
     {
-        if holds(&self.value) { Ok(self) } else { Err(SceneError::new(&self.position, format!("\"{name}\" is {:?}, it must be {rule}", self.value))) }
+        if holds(&self.value) {
+            Ok(self)
+        } else {
+            Err(SceneError::new(&self.position, format!("\"{name}\" is {:?}, it must be {rule}", self.value)))
+        }
     }
 }

@@ -21,10 +21,17 @@ pub(super) const OPERATIONS: [(&str, &[&str]); 5] = [
 ];
 
 /// The matrix of one operation; what has to be remarked about it goes to `note`.
-pub(super) fn operation(element: &str, at: &Position, attributes: &[Attribute<'_>], note: &mut dyn FnMut(&Position, String)) -> Result<DMat4> {
+pub(super) fn operation(
+    element: &str,
+    at: &Position,
+    attributes: &[Attribute<'_>],
+    note: &mut dyn FnMut(&Position, String),
+) -> Result<DMat4> {
     let find = |name: &str| attributes.iter().find(|a| a.name == name);
     let need = |name: &str| find(name).ok_or_else(|| SceneError::new(at, format!("<{element}> needs the attribute \"{name}\"")));
-    let scalar = |a: &Attribute<'_>| number::number(&a.value).map_err(|why| SceneError::new(&a.position, format!("{} of <{element}>: {why}", a.name)));
+    let scalar = |a: &Attribute<'_>| {
+        number::number(&a.value).map_err(|why| SceneError::new(&a.position, format!("{} of <{element}>: {why}", a.name)))
+    };
     let triple = |a: &Attribute<'_>| {
         let read = number::triple(&a.value).map_err(|why| SceneError::new(&a.position, format!("{} of <{element}>: {why}", a.name)))?;
         Ok::<_, SceneError>(DVec3::from_array(read))
@@ -34,9 +41,12 @@ pub(super) fn operation(element: &str, at: &Position, attributes: &[Attribute<'_
         let separate: Vec<_> = ["x", "y", "z"].into_iter().map(find).collect();
         if let Some(all) = find("value") {
             if separate.iter().any(Option::is_some) {
-                return Err(SceneError::new(&all.position, format!("<{element}> has both \"value\" and x, y, z")).help("give one of the two"));
+                return Err(
+                    SceneError::new(&all.position, format!("<{element}> has both \"value\" and x, y, z")).help("give one of the two")
+                );
             }
-            let read = number::one_or_three(&all.value).map_err(|why| SceneError::new(&all.position, format!("value of <{element}>: {why}")))?;
+            let read =
+                number::one_or_three(&all.value).map_err(|why| SceneError::new(&all.position, format!("value of <{element}>: {why}")))?;
             return Ok(DVec3::from_array(read));
         }
         let mut v = DVec3::splat(default);
@@ -59,7 +69,16 @@ pub(super) fn operation(element: &str, at: &Position, attributes: &[Attribute<'_
             }
             if (axis.length() - 1.0).abs() > 1e-3 {
                 let unit = axis.normalize();
-                note(at, format!("<rotate> about an axis of length {:.4}: like Mitsuba 3, this scales and shears; the unit axis is ({:.6}, {:.6}, {:.6})", axis.length(), unit.x, unit.y, unit.z));
+                note(
+                    at,
+                    format!(
+                        "<rotate> about an axis of length {:.4}: like Mitsuba 3, this scales and shears; the unit axis is ({:.6}, {:.6}, {:.6})",
+                        axis.length(),
+                        unit.x,
+                        unit.y,
+                        unit.z
+                    ),
+                );
             }
             Ok(rotate(axis, angle.to_radians()))
         }
@@ -67,7 +86,8 @@ pub(super) fn operation(element: &str, at: &Position, attributes: &[Attribute<'_
             let (origin, target) = (triple(need("origin")?)?, triple(need("target")?)?);
             let up = find("up").map(&triple).transpose()?.unwrap_or(DVec3::ZERO);
             look_at(origin, target, up).ok_or_else(|| {
-                SceneError::new(at, "<lookat> is degenerate").help("origin and target must differ, and \"up\" must not point along the line between them")
+                SceneError::new(at, "<lookat> is degenerate")
+                    .help("origin and target must differ, and \"up\" must not point along the line between them")
             })
         }
         _ => {

@@ -30,7 +30,15 @@ pub(super) struct Tree {
 
 /// Reads `path` and everything it includes; `defines` fill `$name`.
 pub(super) fn read(path: &Path, defines: &[(String, String)], files: &mut Files) -> Result<Tree> {
-    let mut reader = Reader { files, parameters: HashMap::new(), plugins: Vec::new(), references: Vec::new(), ids: HashMap::new(), notes: Vec::new(), open: Vec::new() };
+    let mut reader = Reader {
+        files,
+        parameters: HashMap::new(),
+        plugins: Vec::new(),
+        references: Vec::new(),
+        ids: HashMap::new(),
+        notes: Vec::new(),
+        open: Vec::new(),
+    };
     for (name, value) in defines {
         reader.parameters.insert(name.clone(), Parameter { value: value.clone(), defined: true, used: false });
     }
@@ -38,7 +46,8 @@ pub(super) fn read(path: &Path, defines: &[(String, String)], files: &mut Files)
     reader.check_defines(path)?;
     if reader.plugins[root].kind != Kind::Scene {
         let position = reader.plugins[root].position.clone();
-        return Err(SceneError::new(&position, format!("the file holds a {}, not a scene", reader.plugins[root].title())).help("the outermost element must be <scene version=\"3.0.0\">"));
+        return Err(SceneError::new(&position, format!("the file holds a {}, not a scene", reader.plugins[root].title()))
+            .help("the outermost element must be <scene version=\"3.0.0\">"));
     }
     reader.link()?;
     reader.check_cycles()?;
@@ -168,14 +177,23 @@ impl Reader<'_> {
         Ok(self.plugins.len() - 1)
     }
 
-    fn object(&mut self, source: &Source<'_>, node: Node<'_, '_>, kind: Kind, attributes: Vec<Attribute<'_>>, depth: usize) -> Result<PluginId> {
+    fn object(
+        &mut self,
+        source: &Source<'_>,
+        node: Node<'_, '_>,
+        kind: Kind,
+        attributes: Vec<Attribute<'_>>,
+        depth: usize,
+    ) -> Result<PluginId> {
         let at = source.at(node);
         if depth > DEEPEST_OBJECT {
             return Err(SceneError::new(&at, format!("objects are nested more than {DEEPEST_OBJECT} deep")));
         }
         let text = |name: &str| attributes.iter().find(|a| a.name == name);
         let Some(type_name) = text("type") else {
-            return Err(SceneError::new(&at, format!("<{}> has no type", kind.element())).help(format!("write <{} type=\"...\">", kind.element())));
+            return Err(
+                SceneError::new(&at, format!("<{}> has no type", kind.element())).help(format!("write <{} type=\"...\">", kind.element()))
+            );
         };
         let id = text("id");
         let mut plugin = Plugin::new(kind, type_name.value.clone(), id.map(|a| a.value.clone()), at, source.folders.clone());
@@ -210,7 +228,8 @@ impl Reader<'_> {
         let attributes = self.attributes(source, node)?;
         let element = node.tag_name().name();
         if element == "spectrum" && attributes.iter().any(|a| a.name == "type") {
-            return Err(SceneError::new(&at, "spectrum plugins are not supported").help("write <spectrum name=\"...\" value=\"ONE NUMBER\"/> or <rgb>"));
+            return Err(SceneError::new(&at, "spectrum plugins are not supported")
+                .help("write <spectrum name=\"...\" value=\"ONE NUMBER\"/> or <rgb>"));
         }
         if let Some(kind) = kind_of(node) {
             if kind == Kind::Scene {
@@ -255,7 +274,14 @@ impl Reader<'_> {
         self.adopt(owner, name, at, owner)
     }
 
-    fn include(&mut self, source: &Source<'_>, node: Node<'_, '_>, attributes: &[Attribute<'_>], owner: PluginId, at: Position) -> Result<()> {
+    fn include(
+        &mut self,
+        source: &Source<'_>,
+        node: Node<'_, '_>,
+        attributes: &[Attribute<'_>],
+        owner: PluginId,
+        at: Position,
+    ) -> Result<()> {
         check_attributes(node, attributes, &["filename", "name"])?;
         self.check_childless(node, &at)?;
         let file = required(node, attributes, "filename", &at)?;
@@ -274,7 +300,8 @@ impl Reader<'_> {
         let name = required(node, attributes, "name", &at)?;
         let value = required(node, attributes, "value", &at)?;
         if name.value.is_empty() || !name.value.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(SceneError::new(&name.position, format!("\"{}\" is no name for a parameter", excerpt(&name.value))).help("letters, digits and _ are allowed"));
+            return Err(SceneError::new(&name.position, format!("\"{}\" is no name for a parameter", excerpt(&name.value)))
+                .help("letters, digits and _ are allowed"));
         }
         let value = value.value.clone();
         // What was given before, with -D or by an earlier default, stays. A -D of a declared name is known even where nothing uses it.
@@ -291,7 +318,14 @@ impl Reader<'_> {
 
     // ---- parameters -----------------------------------------------------------------------------------------------------------
 
-    fn property(&mut self, source: &Source<'_>, node: Node<'_, '_>, attributes: &[Attribute<'_>], owner: PluginId, at: Position) -> Result<()> {
+    fn property(
+        &mut self,
+        source: &Source<'_>,
+        node: Node<'_, '_>,
+        attributes: &[Attribute<'_>],
+        owner: PluginId,
+        at: Position,
+    ) -> Result<()> {
         let element = node.tag_name().name();
         let allowed: &[&str] = match element {
             "transform" => &["name"],
@@ -299,7 +333,8 @@ impl Reader<'_> {
             "spectrum" => &["name", "value", "filename"],
             "float" | "integer" | "boolean" | "string" | "rgb" => &["name", "value"],
             _ if OPERATIONS.iter().any(|(operation, _)| *operation == element) => {
-                return Err(SceneError::new(&at, format!("<{element}> outside a <transform>")).help("write <transform name=\"to_world\"> around it"));
+                return Err(SceneError::new(&at, format!("<{element}> outside a <transform>"))
+                    .help("write <transform name=\"to_world\"> around it"));
             }
             _ => return Err(unknown_element(&at, element)),
         };
@@ -333,7 +368,8 @@ impl Reader<'_> {
             check_attributes(child, &attributes, allowed)?;
             self.check_childless(child, &at)?;
             let notes = &mut self.notes;
-            let matrix = transform::operation(element, &at, &attributes, &mut |position, message| notes.push(Note::new(position, message)))?;
+            let matrix =
+                transform::operation(element, &at, &attributes, &mut |position, message| notes.push(Note::new(position, message)))?;
             // In the order written: a later operation acts on what the earlier ones gave.
             total = matrix * total;
             if !total.is_finite() {
@@ -377,7 +413,11 @@ impl Reader<'_> {
             let Some(parameter) = known.and_then(|end| self.parameters.get_mut(&after[..end]).map(|p| (end, p))) else {
                 let names: Vec<&str> = self.parameters.keys().map(String::as_str).collect();
                 let message = format!("${} has no value", excerpt(&after[..length]));
-                let help = format!("give it with -D {}=..., or write <default> before this line; {}", excerpt(&after[..length]), suggest(&after[..length], &names));
+                let help = format!(
+                    "give it with -D {}=..., or write <default> before this line; {}",
+                    excerpt(&after[..length]),
+                    suggest(&after[..length], &names)
+                );
                 return Err(SceneError::new(at, message).help(help));
             };
             let (end, parameter) = parameter;
@@ -397,7 +437,8 @@ impl Reader<'_> {
         unused.sort_unstable();
         let Some(name) = unused.first() else { return Ok(()) };
         let known: Vec<&str> = self.parameters.iter().filter(|(_, p)| p.used).map(|(name, _)| name.as_str()).collect();
-        Err(SceneError::new(&Position::whole(path), format!("-D {}: the scene has no ${}", excerpt(name), excerpt(name))).help(suggest(name, &known)))
+        Err(SceneError::new(&Position::whole(path), format!("-D {}: the scene has no ${}", excerpt(name), excerpt(name)))
+            .help(suggest(name, &known)))
     }
 
     // ---- references -----------------------------------------------------------------------------------------------------------
@@ -434,7 +475,10 @@ impl Reader<'_> {
                 };
                 stack.push((plugin, next + 1));
                 if !open.insert(child.target) {
-                    return Err(SceneError::new(&child.position, format!("the {} contains itself through this reference", self.plugins[child.target].title())));
+                    return Err(SceneError::new(
+                        &child.position,
+                        format!("the {} contains itself through this reference", self.plugins[child.target].title()),
+                    ));
                 }
                 stack.push((child.target, 0));
             }
@@ -472,12 +516,17 @@ fn check_attributes(node: Node<'_, '_>, attributes: &[Attribute<'_>], allowed: &
 }
 
 fn required<'a, 'n>(node: Node<'_, '_>, attributes: &'a [Attribute<'n>], name: &str, at: &Position) -> Result<&'a Attribute<'n>> {
-    attributes.iter().find(|a| a.name == name).ok_or_else(|| SceneError::new(at, format!("<{}> needs the attribute \"{name}\"", node.tag_name().name())))
+    attributes
+        .iter()
+        .find(|a| a.name == name)
+        .ok_or_else(|| SceneError::new(at, format!("<{}> needs the attribute \"{name}\"", node.tag_name().name())))
 }
 
 fn check_version(version: &Attribute<'_>) -> Result<()> {
     let parts: Vec<Option<u32>> = version.value.split('.').map(|part| part.parse().ok()).collect();
-    let wrong = |message: String| SceneError::new(&version.position, message).help("versions 3.x are supported; Mitsuba's own tools convert older scenes");
+    let wrong = |message: String| {
+        SceneError::new(&version.position, message).help("versions 3.x are supported; Mitsuba's own tools convert older scenes")
+    };
     if parts.len() > 3 || parts.iter().any(Option::is_none) {
         return Err(wrong(format!("\"{}\" is not a version", excerpt(&version.value))));
     }
@@ -492,7 +541,9 @@ fn value_of(element: &str, node: Node<'_, '_>, attributes: &[Attribute<'_>], at:
     let wrong = |a: &Attribute<'_>, why: String| SceneError::new(&a.position, format!("{} of <{element}>: {why}", a.name));
     if element == "spectrum" {
         if let Some(file) = attributes.iter().find(|a| a.name == "filename") {
-            return Err(wrong(file, "spectra from files are not supported".to_owned()).help("colours are RGB here: give one number, or <rgb>"));
+            return Err(
+                wrong(file, "spectra from files are not supported".to_owned()).help("colours are RGB here: give one number, or <rgb>")
+            );
         }
     }
     if element == "point" || element == "vector" {
@@ -532,7 +583,10 @@ fn value_of(element: &str, node: Node<'_, '_>, attributes: &[Attribute<'_>], at:
 
 fn syntax_error(path: &Path, e: &roxmltree::Error) -> SceneError {
     let position = match e {
-        roxmltree::Error::DtdDetected | roxmltree::Error::NodesLimitReached | roxmltree::Error::NoRootNode | roxmltree::Error::UnclosedRootNode => Position::line(path, 1),
+        roxmltree::Error::DtdDetected
+        | roxmltree::Error::NodesLimitReached
+        | roxmltree::Error::NoRootNode
+        | roxmltree::Error::UnclosedRootNode => Position::line(path, 1),
         _ => Position { file: Arc::from(path), line: Some(e.pos().row), column: Some(e.pos().col) },
     };
     let error = SceneError::new(&position, format!("not well-formed XML: {e}"));

@@ -247,7 +247,3 @@ fn geometric_normal(corners: [Vec3; 3]) -> Vec3 {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     (b - a).cross(c - a).normalize_or_zero().as_vec3()
 }
-
-#[cfg(test)]
-#[path = "surface_tests.rs"]
-mod tests;
