@@ -1,7 +1,7 @@
 //! `isophote info FILE.exr|SCENE.xml`.
 
 use super::failure::{Failure, Outcome};
-use super::output::{bytes, print, print_json, table};
+use super::output::{bytes, print, print_json};
 use super::scene::{self, SceneChanges};
 use crate::image::exr::{ExrFile, read_file};
 use crate::scene::bsdf::Bsdf;
@@ -160,11 +160,15 @@ fn entry(out: &mut String, key: &str, value: &Value) {
         Value::Object(map) if map.is_empty() => {}
         Value::Array(list) if list.is_empty() => {}
         Value::Object(map) => {
-            let shown = |k: &str, v: &Value| match v.as_u64() {
-                Some(count) if key == "memory" => vec![format!("  {k}"), bytes(count)],
-                _ => vec![format!("  {k}"), scalar(v)],
-            };
-            *out += &format!("{key}\n{}", table(&map.iter().map(|(k, v)| shown(k, v)).collect::<Vec<_>>()));
+            let width = map.keys().map(String::len).max().unwrap_or(0);
+            *out += &format!("{key}\n");
+            for (name, value) in map {
+                let shown = match value.as_u64() {
+                    Some(count) if key == "memory" => bytes(count),
+                    _ => scalar(value),
+                };
+                *out += &format!("  {name:<width$}  {shown}\n");
+            }
         }
         Value::Array(list) if list.iter().any(|v| v.is_object() || v.is_string()) => {
             *out += &format!("{key}\n");

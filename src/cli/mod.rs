@@ -66,9 +66,9 @@ fn command(methods: &'static [Method]) -> Command {
         .arg_required_else_help(true)
         .args([verbose, quiet.help("Tell nothing but errors")])
         .subcommand(render::command(methods))
-        .subcommand(compare::CompareArgs::augment_args(Command::new("compare").about("Metrics of images against a reference")))
-        .subcommand(info::InfoArgs::augment_args(Command::new("info").about("What is in an EXR file or a scene")))
-        .subcommand(list::ListArgs::augment_args(Command::new("list").about("What methods, samplers, materials and metrics there are")))
+        .subcommand(compare::CompareArgs::augment_args(Command::new("compare")).about("Metrics of images against a reference"))
+        .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
+        .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
 }
 

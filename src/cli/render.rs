@@ -92,9 +92,10 @@ struct RenderArgs {
 /// The command with one subcommand a method.
 pub(super) fn command(methods: &'static [Method]) -> Command {
     let method_command = |method: &'static Method| {
-        let command = Command::new(method.name).about(method.about).after_help(format!("More in docs/{}.", method.page));
-        let command = (method.augment)(command.next_help_heading("Options of the method"));
-        RenderArgs::augment_args(command)
+        let command = (method.augment)(Command::new(method.name).next_help_heading("Options of the method"));
+        // Adding the structs of options also sets their own descriptions, so the method's comes last.
+        let command = RenderArgs::augment_args(command).about(method.about).long_about(None);
+        command.after_help(format!("More in docs/{}.", method.page))
     };
     Command::new("render")
         .about("Renders one image")

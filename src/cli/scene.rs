@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct SceneArgs {
     /// Scene, a Mitsuba 3 XML file
-    #[arg(value_name = "SCENE.xml")]
+    #[arg(value_name = "SCENE.xml", help_heading = None)]
     pub(crate) scene: PathBuf,
     #[command(flatten)]
     pub(crate) changes: SceneChanges,

@@ -1,0 +1,100 @@
+//! Help, `compare`, `info`, `list`, `completions`.
+
+use crate::bench::Bench;
+use isophote::image::metrics::METRICS;
+use isophote::integrators::METHODS;
+use isophote::math::Rgb;
+
+#[test]
+fn every_command_and_method_has_help() {
+    let bench = Bench::new();
+    for command in ["render", "compare", "info", "list", "completions"] {
+        assert!(bench.succeed(&[command, "--help"]).contains("Usage"), "{command}");
+        assert!(bench.succeed(&["--help"]).contains(command));
+    }
+    let options = "iterations time resolution crop hide-emitters max-depth min-depth paths seed threads snapshots checkpoint reference aov \
+                   max-memory json preview exposure output define";
+    for method in METHODS {
+        let help = bench.succeed(&["render", method.name, "--help"]);
+        for option in options.split_whitespace() {
+            assert!(help.contains(&format!("--{option} ")) || help.contains(&format!("--{option}\n")), "{}: --{option}", method.name);
+        }
+        assert!(help.starts_with(method.about), "{help}");
+        assert!(bench.succeed(&["render", "--help"]).contains(method.about));
+    }
+}
+
+#[test]
+fn compare_prints_the_metrics_of_hand_made_images() {
+    let bench = Bench::new();
+    bench.write("r.mean.exr", 1, vec![Rgb::new(0.0, 1.0, 2.0)]);
+    bench.write("x.exr", 1, vec![Rgb::new(1.0, 1.0, 0.0)]);
+    bench.write("y.exr", 1, vec![Rgb::new(0.0, f32::NAN, 2.0)]);
+    bench.write("r.var.exr", 1, vec![Rgb::splat(0.25)]);
+    let document = bench.json(&["compare", "r.mean.exr", "x.exr", "y.exr", "--json"]);
+    let images = document["images"].as_array().unwrap();
+    let check = |key: &str, expected: f64| {
+        let found = images[0][key].as_f64().unwrap();
+        assert!((found - expected).abs() < 1e-9 * expected.max(1.0), "{key}: {found}, by hand {expected}");
+    };
+    check("mse", 5.0 / 3.0);
+    check("rmse", (5.0_f64 / 3.0).sqrt());
+    check("relmse", (100.0 + 4.0 / 4.01) / 3.0);
+    check("relmse_trimmed", (100.0 + 4.0 / 4.01) / 3.0);
+    check("mape", (100.0 + 2.0 / 2.01) / 3.0);
+    check("smape", (2.0 / 1.02 + 4.0 / 2.02) / 3.0);
+    check("srrmse", (8.0_f64 / 3.0).sqrt());
+    check("masked", 0.0);
+    // A NaN masks its pixel; nothing is left to measure, and nothing is made up.
+    assert_eq!((images[1]["masked"].as_u64(), images[1]["mse"].is_null()), (Some(1), true));
+    // The variance beside the reference's mean is found.
+    assert_eq!(document["reference_var"]["mse"], 0.25);
+    let other = bench.json(&["compare", "r.mean.exr", "x.exr", "--epsilon", "1", "--json"]);
+    assert_eq!(other["images"][0]["relmse"].as_f64().unwrap(), (1.0 + 4.0 / 5.0) / 3.0);
+    let table = bench.succeed(&["compare", "r.mean.exr", "x.exr", "--epsilon", "0.5"]);
+    assert!(METRICS.iter().all(|m| table.contains(m.name)) && table.contains("epsilon 0.5"), "{table}");
+}
+
+#[test]
+fn info_tells_what_is_in_a_scene_and_in_an_image() {
+    let bench = Bench::new();
+    let scene = bench.json(&["info", "lamp/scene.xml", "--resolution", "20x10", "--json"]);
+    assert_eq!((scene["width"].as_u64(), scene["height"].as_u64()), (Some(20), Some(10)));
+    assert_eq!(scene["defaults"]["sample_count"], 3);
+    assert_eq!(scene["defaults"]["max_depth"], 4);
+    assert_eq!(scene["emitters"]["area"], 1);
+    assert_eq!(scene["counts"]["quadrics"], 1);
+    assert!(scene["bounds"]["min"].is_array() && scene["memory"]["accelerator"].is_u64() && scene["notes"].is_array());
+    assert!(bench.succeed(&["info", "lamp/scene.xml"]).contains("sample_count"));
+    bench.succeed(&["render", METHODS[0].name, "lamp/scene.xml", "-o", "a.exr", "--iterations", "1", "-q"]);
+    let image = bench.json(&["info", "a.exr", "--json"]);
+    assert_eq!((image["width"].as_u64(), image["channels"].as_array().unwrap().len()), (Some(16), 3));
+    assert_eq!(image["isophote"]["method"], METHODS[0].name);
+    assert!(bench.succeed(&["info", "a.exr"]).contains(METHODS[0].name));
+}
+
+#[test]
+fn list_names_everything_there_is() {
+    let bench = Bench::new();
+    let all = bench.json(&["list", "--json"]);
+    let names = |table: &str| -> Vec<&str> { all[table].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect() };
+    assert_eq!(names("methods"), METHODS.iter().map(|m| m.name).collect::<Vec<_>>());
+    assert_eq!(names("metrics"), METRICS.iter().map(|m| m.name).collect::<Vec<_>>());
+    assert!(names("samplers").contains(&"uniform") && names("bsdfs").contains(&"diffuse"));
+    let text = bench.succeed(&["list"]);
+    for table in ["methods", "samplers", "bsdfs", "metrics"] {
+        assert!(text.contains(table));
+        assert!(bench.json(&["list", table, "--json"])[table] == all[table]);
+        let first = names(table)[0];
+        assert!(bench.succeed(&["list", table]).contains(first), "{table}");
+    }
+}
+
+#[test]
+fn shells_get_completions() {
+    let bench = Bench::new();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = bench.succeed(&["completions", shell]);
+        assert!(script.contains("isophote") && METHODS.iter().all(|m| script.contains(m.name)), "{shell}");
+    }
+}

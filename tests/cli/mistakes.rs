@@ -1,0 +1,79 @@
+//! What goes wrong is told in one line, with status 2, before anything is rendered.
+
+use crate::bench::Bench;
+use isophote::integrators::METHODS;
+use isophote::math::Rgb;
+
+/// Runs what has to be refused; what it tells.
+fn refused(bench: &Bench, arguments: &[&str]) -> String {
+    let output = bench.run(arguments);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {told}");
+    assert!(output.stdout.is_empty(), "{arguments:?} prints to standard output");
+    assert!(!told.contains("panicked") && !told.contains("RUST_BACKTRACE"), "{arguments:?}: {told}");
+    told
+}
+
+#[test]
+fn usage_that_is_wrong_is_told() {
+    let bench = Bench::new();
+    let method = METHODS[0].name;
+    refused(&bench, &[]);
+    let mistakes: &[(&[&str], &str)] = &[
+        (&["rendr"], "render"),
+        (&["resume", "a.exr"], "unrecognized"),
+        (&["render"], "METHOD"),
+        (&["render", "magic", "lamp/scene.xml"], "magic"),
+        (&["render", method], "SCENE.xml"),
+        (&["render", method, "lamp/scene.xml", "--tev", "a:1"], "--tev"),
+        (&["render", method, "lamp/scene.xml", "--resolution", "64"], "WIDTHxHEIGHT"),
+        (&["render", method, "lamp/scene.xml", "--iterations", "0"], "no iteration"),
+        (&["render", method, "lamp/scene.xml", "--iterations", "9:3"], "no iteration"),
+        (&["render", method, "lamp/scene.xml", "--max-depth", "0"], "-1"),
+        (&["render", method, "lamp/scene.xml", "--time", "-1"], "seconds"),
+        (&["render", method, "lamp/scene.xml", "--paths", "L("], "L("),
+        (&["render", method, "lamp/scene.xml", "--exposure", "2"], "--preview"),
+        (&["render", method, "lamp/scene.xml", "--snapshots", "often"], "pow2"),
+        (&["render", method, "lamp/scene.xml", "--aov", "depth"], "variance"),
+        (&["compare", "a.exr"], "IMAGE"),
+        (&["list", "colours"], "methods"),
+    ];
+    for (arguments, expected) in mistakes {
+        let told = refused(&bench, arguments);
+        assert!(told.contains(expected), "{arguments:?}: {told}");
+    }
+    assert!(bench.files().is_empty(), "{:?}", bench.files());
+}
+
+#[test]
+fn input_that_is_bad_is_told_with_its_name() {
+    let bench = Bench::new();
+    let method = METHODS[0].name;
+    std::fs::write(bench.path("text.exr"), "no picture at all").unwrap();
+    std::fs::write(bench.path("broken.xml"), "<scene version=\"3.0.0\">\n  <shape type=\"sphere\">\n</scene>").unwrap();
+    bench.write("small.exr", 2, vec![Rgb::WHITE; 4]);
+    bench.write("large.exr", 3, vec![Rgb::WHITE; 9]);
+    let before = bench.files();
+    let mistakes: &[(&[&str], &[&str])] = &[
+        (&["render", method, "missing.xml"], &["missing.xml"]),
+        (&["render", method, "broken.xml"], &["broken.xml:"]),
+        (&["render", method, "lamp/scene.xml", "-o", "nowhere/a.exr"], &["nowhere"]),
+        (&["render", method, "lamp/scene.xml", "-o", "lamp"], &["lamp", "not a file"]),
+        (&["render", method, "lamp/scene.xml", "--reference", "text.exr"], &["text.exr", "not a readable EXR"]),
+        (&["render", method, "lamp/scene.xml", "--reference", "small.exr"], &["small.exr", "16x12", "2x2", "help:"]),
+        (&["render", method, "lamp/scene.xml", "--max-memory", "1K"], &["--max-memory", "help:"]),
+        (&["render", method, "lamp/scene.xml", "--crop", "10,10,20,20"], &["crop"]),
+        (&["compare", "small.exr", "large.exr"], &["large.exr", "3x3", "2x2"]),
+        (&["compare", "missing.exr", "small.exr"], &["missing.exr"]),
+        (&["info", "missing.exr"], &["missing.exr"]),
+        (&["info", "text.exr"], &["text.exr", "not a readable EXR"]),
+    ];
+    for (arguments, expected) in mistakes {
+        let told = refused(&bench, arguments);
+        assert!(told.starts_with("error: "), "{arguments:?}: {told}");
+        for part in *expected {
+            assert!(told.contains(part), "{arguments:?} does not tell {part:?}: {told}");
+        }
+    }
+    assert_eq!(bench.files(), before);
+}

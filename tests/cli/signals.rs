@@ -1,0 +1,54 @@
+//! Interrupts: the work is saved, the status says which signal it was.
+
+use crate::bench::{Bench, text};
+use isophote::integrators::METHODS;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Starts a render without end, sends it signals once it has iterated, and gives its exit status.
+fn interrupt(bench: &Bench, method: &str, signals: &[&str]) -> Option<i32> {
+    let arguments = ["render", method, "lamp/scene.xml", "-o", "a.exr", "--time", "600", "--checkpoint", "0.001", "-q"];
+    let mut child = bench.command(&arguments).stdout(Stdio::null()).spawn().unwrap();
+    let start = Instant::now();
+    // The first checkpoint shows that it renders.
+    while !bench.path("a.exr").exists() && start.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    for signal in signals {
+        assert!(Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap().success());
+    }
+    let status = child.wait().unwrap();
+    assert!(start.elapsed() < Duration::from_secs(60), "{method} ends only with its time");
+    status.code()
+}
+
+#[test]
+fn the_image_is_saved_and_the_signal_told() {
+    for method in METHODS {
+        for (signals, expected) in [(&["INT"][..], 130), (&["TERM"][..], 143), (&["INT", "INT", "TERM"][..], 130)] {
+            let bench = Bench::new();
+            assert_eq!(interrupt(&bench, method.name, signals), Some(expected), "{} {signals:?}", method.name);
+            assert_eq!(bench.files(), ["a.exr"], "{} {signals:?}", method.name);
+            let picture = bench.read("a.exr").picture().unwrap();
+            assert_eq!((picture.size(), picture.non_finite()), ((16, 12), 0));
+            let ranges = &bench.metadata("a.exr")["runs"][0]["ranges"][0];
+            assert!(ranges[1].as_u64().unwrap() >= 1, "{ranges}");
+        }
+    }
+}
+
+#[test]
+fn the_old_image_stays_until_the_new_one_is_whole() {
+    // Killed outright at any moment, what stands under the name is a whole image.
+    let bench = Bench::new();
+    let arguments = ["render", METHODS[0].name, "lamp/scene.xml", "-o", "a.exr", "--time", "600", "--checkpoint", "0.001", "-q"];
+    for delay in [30, 60, 90] {
+        bench.succeed(&["render", METHODS[0].name, "lamp/scene.xml", "-o", "a.exr", "--iterations", "1", "-q"]);
+        let mut child = bench.command(&arguments).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(delay));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let file = bench.path("a.exr");
+        assert!(isophote::image::exr::read_picture(&file).is_ok(), "{} after {delay} ms", text(&file));
+    }
+}
