@@ -111,10 +111,18 @@ impl Bvh {
 
 impl Accel for Bvh {
     fn closest(&self, ray: &Ray) -> Option<RawHit> {
-        if self.stack <= SHALLOW { self.closest_within::<SHALLOW>(ray) } else { self.closest_within::<DEEP>(ray) }
+        if self.stack <= SHALLOW {
+            self.closest_within::<SHALLOW>(ray)
+        } else {
+            self.closest_within::<DEEP>(ray)
+        }
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        if self.stack <= SHALLOW { self.occluded_within::<SHALLOW>(ray) } else { self.occluded_within::<DEEP>(ray) }
+        if self.stack <= SHALLOW {
+            self.occluded_within::<SHALLOW>(ray)
+        } else {
+            self.occluded_within::<DEEP>(ray)
+        }
     }
 }

@@ -94,16 +94,29 @@ impl Binary {
     }
 
     fn costs(&self, items: &[Item]) -> Vec<Costs> {
-        let none = Costs { slots: [0.0; 7], triangles: 1, leaf: true };
+        let none = Costs {
+            slots: [0.0; 7],
+            triangles: 1,
+            leaf: true,
+        };
         let mut costs = vec![none; self.nodes.len()];
         for &n in self.order().iter().rev() {
             let area = half_area(&self.nodes[n as usize].bounds);
             let Some(both) = self.children(n) else {
-                let triangle = matches!(items[self.nodes[n as usize].a as usize], Item::Triangle(..));
-                costs[n as usize] = Costs { slots: [area * LEAF_COST; 7], triangles: if triangle { 1 } else { WIDTH + 1 }, ..none };
+                let triangle =
+                    matches!(items[self.nodes[n as usize].a as usize], Item::Triangle(..));
+                costs[n as usize] = Costs {
+                    slots: [area * LEAF_COST; 7],
+                    triangles: if triangle { 1 } else { WIDTH + 1 },
+                    ..none
+                };
                 continue;
             };
-            let triangles = both.iter().map(|&c| costs[c as usize].triangles).sum::<u32>().min(WIDTH + 1);
+            let triangles = both
+                .iter()
+                .map(|&c| costs[c as usize].triangles)
+                .sum::<u32>()
+                .min(WIDTH + 1);
             let inside = Self::share(&costs, both, 8).0;
             let as_node = area * NODE_COST + inside;
             let as_leaf = area * LEAF_COST;
@@ -112,7 +125,11 @@ impl Binary {
             for i in 1..7 {
                 slots[i] = slots[i - 1].min(Self::share(&costs, both, i + 1).0);
             }
-            costs[n as usize] = Costs { slots, triangles, leaf };
+            costs[n as usize] = Costs {
+                slots,
+                triangles,
+                leaf,
+            };
         }
         costs
     }
@@ -138,7 +155,10 @@ impl Binary {
     }
 
     fn analytic(&self, items: &[Item], n: u32) -> Option<u32> {
-        match (self.children(n), items.get(self.nodes[n as usize].a as usize)) {
+        match (
+            self.children(n),
+            items.get(self.nodes[n as usize].a as usize),
+        ) {
             (None, Some(Item::Analytic(place))) => Some(*place),
             _ => None,
         }
@@ -150,7 +170,9 @@ impl Binary {
             match self.children(n) {
                 Some([a, b]) => todo.extend([b, a]),
                 None => {
-                    if let Item::Triangle(number, corners) = items[self.nodes[n as usize].a as usize] {
+                    if let Item::Triangle(number, corners) =
+                        items[self.nodes[n as usize].a as usize]
+                    {
                         out.push((number, corners));
                     }
                 }
@@ -190,10 +212,21 @@ impl Binary {
                         planes[axis][lane] = [b.min[axis], b.max[axis]];
                     }
                 }
-                let pair = |axis: usize| [0, 1].map(|side| f32x8::new(planes[axis].map(|p| p[side])));
-                nodes.push(Node { x: pair(0), y: pair(1), z: pair(2), ..Node::NONE });
+                let pair =
+                    |axis: usize| [0, 1].map(|side| f32x8::new(planes[axis].map(|p| p[side])));
+                nodes.push(Node {
+                    x: pair(0),
+                    y: pair(1),
+                    z: pair(2),
+                    ..Node::NONE
+                });
                 let me = nodes.len() - 1;
-                todo.extend(kids.iter().enumerate().rev().map(|(lane, &kid)| (kid, Some((me, lane)))));
+                todo.extend(
+                    kids.iter()
+                        .enumerate()
+                        .rev()
+                        .map(|(lane, &kid)| (kid, Some((me, lane)))),
+                );
                 me as u32
             };
             match slot {
@@ -204,7 +237,12 @@ impl Binary {
         nodes.shrink_to_fit();
         triangles.shrink_to_fit();
         let stack = stack_needed(&nodes);
-        Wide { nodes, triangles, root, stack }
+        Wide {
+            nodes,
+            triangles,
+            root,
+            stack,
+        }
     }
 }
 
@@ -214,7 +252,11 @@ fn stack_needed(nodes: &[Node]) -> usize {
     for (n, node) in nodes.iter().enumerate().rev() {
         let present = node.child.iter().filter(|&&c| c != super::node::EMPTY);
         let count = present.clone().count();
-        let deepest = present.filter(|&&c| c & LEAF == 0).map(|&c| needed[c as usize]).max().unwrap_or(0);
+        let deepest = present
+            .filter(|&&c| c & LEAF == 0)
+            .map(|&c| needed[c as usize])
+            .max()
+            .unwrap_or(0);
         needed[n] = count.saturating_sub(1) + deepest;
     }
     needed.first().copied().unwrap_or(0)
