@@ -18,11 +18,7 @@ pub struct Ray {
 impl Ray {
     /// The ray that never ends.
     pub fn new(o: Vec3, d: Vec3) -> Self {
-        Self {
-            o,
-            d,
-            t_max: f32::INFINITY,
-        }
+        Self { o, d, t_max: f32::INFINITY }
     }
 }
 

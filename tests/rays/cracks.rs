@@ -17,16 +17,8 @@ fn closed() -> Vec<(Mesh, Vec3, f32)> {
         (bumpy(far, 1.0, 0.1, 30, 40), far, 0.5),
         (bumpy(at, 1.0, 0.0, 3, 3), at, 0.05),
         (bumpy(Vec3::ZERO, 1.0, 0.0, 200, 4), Vec3::ZERO, 0.4),
-        (
-            cuboid(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)),
-            Vec3::new(0.5, 1.0, 1.5),
-            0.5,
-        ),
-        (
-            cuboid(Vec3::splat(-1e-3), Vec3::new(1e3, 1e-3, 1e-3)),
-            Vec3::splat(2e-4),
-            2e-4,
-        ),
+        (cuboid(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)), Vec3::new(0.5, 1.0, 1.5), 0.5),
+        (cuboid(Vec3::splat(-1e-3), Vec3::new(1e3, 1e-3, 1e-3)), Vec3::splat(2e-4), 2e-4),
     ]
 }
 
@@ -59,11 +51,7 @@ fn random_rays_do_not_leak() {
 fn slow_hundred_million_random_rays_do_not_leak() {
     let count = closed().len();
     for mesh in 0..count {
-        assert_eq!(
-            leaks(mesh, 100_000_000 / count as u64 + 1, 6),
-            0,
-            "mesh {mesh}"
-        );
+        assert_eq!(leaks(mesh, 100_000_000 / count as u64 + 1, 6), 0, "mesh {mesh}");
     }
 }
 
@@ -76,11 +64,7 @@ fn rays_at_corners_and_edges_do_not_leak() {
         for i in 0..100_000 {
             let t = mesh.triangles[rng.random_range(0..mesh.triangles.len())];
             let t = t.map(|i| mesh.corners[i as usize]);
-            let target = if i % 2 == 0 {
-                t[0]
-            } else {
-                t[0].lerp(t[1], rng.random())
-            };
+            let target = if i % 2 == 0 { t[0] } else { t[0].lerp(t[1], rng.random()) };
             let o = at + point(&mut rng) * inside * 0.57;
             leaks += u32::from(bvh.closest(&Ray::new(o, target - o)).is_none());
         }

@@ -14,46 +14,28 @@ fn down(x: f32, y: f32) -> Ray {
 #[test]
 fn nothing_and_one() {
     let none = Bvh::build(&[]);
-    assert_eq!(
-        (none.primitives(), none.memory(), none.bounds()),
-        (0, 0, None)
-    );
+    assert_eq!((none.primitives(), none.memory(), none.bounds()), (0, 0, None));
     assert!(none.closest(&down(0.2, 0.2)).is_none() && !none.occluded(&down(0.2, 0.2)));
     let one = Bvh::build(&[Primitive::Triangle(UNIT)]);
     let hit = one.closest(&down(0.25, 0.5)).unwrap();
     assert_eq!((hit.t, hit.u, hit.v, hit.prim), (2.0, 0.25, 0.5, 0));
     assert!(one.closest(&down(0.75, 0.5)).is_none());
     let bounds = one.bounds().unwrap();
-    assert_eq!(
-        (bounds.min, bounds.max),
-        (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0))
-    );
+    assert_eq!((bounds.min, bounds.max), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)));
     assert!(one.memory() > 0 && one.primitives() == 1);
 }
 
 #[test]
 fn t_max_is_inclusive_and_zero_is_not() {
-    let bvh = Bvh::build(&[
-        Primitive::Triangle(UNIT),
-        sphere(Vec3::new(5.25, 0.25, 0.0), 1.0),
-    ]);
+    let bvh = Bvh::build(&[Primitive::Triangle(UNIT), sphere(Vec3::new(5.25, 0.25, 0.0), 1.0)]);
     for (x, t) in [(0.25, 2.0f32), (5.25, 1.0)] {
         let cut = |t_max: f32| {
-            let ray = Ray {
-                t_max,
-                ..down(x, 0.25)
-            };
+            let ray = Ray { t_max, ..down(x, 0.25) };
             assert_eq!(bvh.occluded(&ray), bvh.closest(&ray).is_some());
             bvh.occluded(&ray)
         };
         assert!(cut(t) && cut(f32::INFINITY) && cut(t.next_up()));
-        assert!(
-            !cut(t.next_down())
-                && !cut(0.0)
-                && !cut(-1.0)
-                && !cut(f32::NAN)
-                && !cut(-f32::INFINITY)
-        );
+        assert!(!cut(t.next_down()) && !cut(0.0) && !cut(-1.0) && !cut(f32::NAN) && !cut(-f32::INFINITY));
     }
     let on = Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::NEG_Z);
     assert!(bvh.closest(&on).is_none());
@@ -68,10 +50,7 @@ fn sphere(center: Vec3, radius: f32) -> Primitive {
 #[test]
 fn what_cannot_be_hit_is_left_out_and_numbers_stay() {
     let nan = Vec3::new(f32::NAN, 0.0, 0.0);
-    let flat = Affine3A {
-        matrix3: Mat3A::from_diagonal(Vec3::new(1.0, 0.0, 1.0)),
-        translation: Vec3A::ZERO,
-    };
+    let flat = Affine3A { matrix3: Mat3A::from_diagonal(Vec3::new(1.0, 0.0, 1.0)), translation: Vec3A::ZERO };
     let list = [
         Primitive::Triangle([Vec3::ZERO, nan, Vec3::X]),
         Primitive::Triangle([Vec3::ZERO, Vec3::X, Vec3::X * 2.0]),
@@ -104,29 +83,19 @@ fn of_coincident_triangles_the_first_is_hit() {
 /// A list whose tree is a chain: each primitive lies in what the others leave free.
 #[test]
 fn chains_do_not_overflow_the_stack() {
-    let spheres: Vec<_> = (0..1500)
-        .map(|i| 1.06f32.powi(i - 750))
-        .map(|s| sphere(Vec3::splat(s), 0.02 * s))
-        .collect();
+    let spheres: Vec<_> = (0..1500).map(|i| 1.06f32.powi(i - 750)).map(|s| sphere(Vec3::splat(s), 0.02 * s)).collect();
     let bvh = Bvh::build(&spheres);
     let mut rng = rng(11);
     for (number, s) in spheres.iter().enumerate() {
-        let Primitive::Sphere { center, radius } = s else {
-            unreachable!()
-        };
+        let Primitive::Sphere { center, radius } = s else { unreachable!() };
         let o = *center + 1.5 * radius * direction(&mut rng);
         let hit = bvh.closest(&Ray::new(o, *center - o)).unwrap();
-        assert!(
-            hit.prim == number as u32 && (hit.t - 1.0 / 3.0).abs() < 1e-2,
-            "{number}: {hit:?}"
-        );
+        assert!(hit.prim == number as u32 && (hit.t - 1.0 / 3.0).abs() < 1e-2, "{number}: {hit:?}");
     }
     for nested in [1000, 3000] {
         let rings: Vec<_> = (1..=nested).map(|i| sphere(Vec3::ZERO, i as f32)).collect();
         let bvh = Bvh::build(&rings);
-        let hit = bvh
-            .closest(&Ray::new(Vec3::new(0.1, 0.0, 0.0), Vec3::ONE))
-            .unwrap();
+        let hit = bvh.closest(&Ray::new(Vec3::new(0.1, 0.0, 0.0), Vec3::ONE)).unwrap();
         assert_eq!(hit.prim, 0);
         let from_outside = Ray::new(Vec3::X * (nested as f32 + 9.0), Vec3::NEG_X);
         assert_eq!(bvh.closest(&from_outside).unwrap().prim, nested - 1);
@@ -137,23 +106,14 @@ fn chains_do_not_overflow_the_stack() {
 fn rays_that_are_none_miss() {
     let mut primitives = triangles(&shapes::bumpy(Vec3::ZERO, 1.0, 0.1, 20, 20));
     primitives.push(sphere(Vec3::ZERO, 0.1));
-    primitives.push(Primitive::Cylinder {
-        to_world: any_map(&mut rng(12)),
-    });
+    primitives.push(Primitive::Cylinder { to_world: any_map(&mut rng(12)) });
     let bvh = Bvh::build(&primitives);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for axis in 0..3 {
             let mut v = Vec3::new(0.1, 0.2, 0.3);
             v[axis] = bad;
-            for ray in [
-                Ray::new(v, Vec3::X),
-                Ray::new(Vec3::ZERO, v),
-                Ray::new(v, v),
-            ] {
-                assert!(
-                    bvh.closest(&ray).is_none() && !bvh.occluded(&ray),
-                    "{ray:?}"
-                );
+            for ray in [Ray::new(v, Vec3::X), Ray::new(Vec3::ZERO, v), Ray::new(v, v)] {
+                assert!(bvh.closest(&ray).is_none() && !bvh.occluded(&ray), "{ray:?}");
             }
         }
     }
@@ -171,10 +131,7 @@ fn directions_of_any_length() {
         let t = bvh.closest(&Ray::new(o, d)).unwrap().t;
         for length in [1e-36f32, 1e-20, 1e20, 1e36] {
             let hit = bvh.closest(&Ray::new(o, d * length)).unwrap();
-            assert!(
-                (hit.t * length / t - 1.0).abs() < 1e-3,
-                "{o} {d} {length}: {hit:?} {t}"
-            );
+            assert!((hit.t * length / t - 1.0).abs() < 1e-3, "{o} {d} {length}: {hit:?} {t}");
         }
     }
 }
@@ -198,11 +155,7 @@ fn denormal_components_are_almost_zero() {
 #[test]
 fn spheres_far_from_the_origin() {
     let mut rng = rng(15);
-    for at in [
-        Vec3::ZERO,
-        Vec3::new(1e4, 0.0, 0.0),
-        Vec3::new(-3e3, 8e3, 5e3),
-    ] {
+    for at in [Vec3::ZERO, Vec3::new(1e4, 0.0, 0.0), Vec3::new(-3e3, 8e3, 5e3)] {
         let bvh = Bvh::build(&[sphere(at, 1.0)]);
         let ulp = 4.0 * f32::EPSILON * (at.length() + 1.0);
         for _ in 0..50_000 {
@@ -220,10 +173,7 @@ fn spheres_far_from_the_origin() {
             let inside = Ray::new(x.as_vec3() - n * ulp, -away);
             let through = bvh.closest(&inside).unwrap().t;
             let chord = 2.0 * away.dot(n);
-            assert!(
-                (through - chord).abs() < 30.0 * ulp / chord.max(ulp.sqrt()) + 30.0 * ulp,
-                "{inside:?}"
-            );
+            assert!((through - chord).abs() < 30.0 * ulp / chord.max(ulp.sqrt()) + 30.0 * ulp, "{inside:?}");
         }
     }
 }

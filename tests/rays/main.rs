@@ -34,32 +34,19 @@ pub(crate) fn triangles(mesh: &shapes::Mesh) -> Vec<Primitive> {
 }
 
 pub(crate) fn any_map(rng: &mut Pcg64Mcg) -> Affine3A {
-    let turn = Mat3A::from_quat(Quat::from_axis_angle(
-        direction(rng),
-        TAU * rng.random::<f32>(),
-    ));
+    let turn = Mat3A::from_quat(Quat::from_axis_angle(direction(rng), TAU * rng.random::<f32>()));
     let stretch = (point(rng) * 0.5 + 0.6) * 0.5;
     let mut shear = Mat3A::IDENTITY;
     shear.x_axis.y = rng.random::<f32>() - 0.5;
-    Affine3A {
-        matrix3: turn * shear * Mat3A::from_diagonal(stretch),
-        translation: Vec3A::from(point(rng)),
-    }
+    Affine3A { matrix3: turn * shear * Mat3A::from_diagonal(stretch), translation: Vec3A::from(point(rng)) }
 }
 
 pub(crate) fn mixture(count: usize, rng: &mut Pcg64Mcg) -> Vec<Primitive> {
     let one = |rng: &mut Pcg64Mcg| match rng.random_range(0..4) {
         0 => Primitive::Triangle([point(rng), point(rng), point(rng)]),
-        1 => Primitive::Sphere {
-            center: point(rng),
-            radius: 0.02 + 0.3 * rng.random::<f32>(),
-        },
-        2 => Primitive::Disk {
-            to_world: any_map(rng),
-        },
-        _ => Primitive::Cylinder {
-            to_world: any_map(rng),
-        },
+        1 => Primitive::Sphere { center: point(rng), radius: 0.02 + 0.3 * rng.random::<f32>() },
+        2 => Primitive::Disk { to_world: any_map(rng) },
+        _ => Primitive::Cylinder { to_world: any_map(rng) },
     };
     (0..count).map(|_| one(rng)).collect()
 }
@@ -72,29 +59,14 @@ pub(crate) fn any_ray(rng: &mut Pcg64Mcg) -> Ray {
             d[axis] = if rng.random() { 0.0 } else { -0.0 };
         }
     }
-    let t_max = if rng.random() {
-        f32::INFINITY
-    } else {
-        2.0 * rng.random::<f32>()
-    };
-    Ray {
-        o: point(rng) * 1.5,
-        d,
-        t_max,
-    }
+    let t_max = if rng.random() { f32::INFINITY } else { 2.0 * rng.random::<f32>() };
+    Ray { o: point(rng) * 1.5, d, t_max }
 }
 
 #[test]
 fn triangle_soups_as_brute_force_has_them() {
     let mut rng = rng(1);
-    for (count, size) in [
-        (1, 1.0),
-        (3, 0.5),
-        (9, 1.0),
-        (60, 0.4),
-        (400, 0.1),
-        (400, 1.0),
-    ] {
+    for (count, size) in [(1, 1.0), (3, 0.5), (9, 1.0), (60, 0.4), (400, 0.1), (400, 1.0)] {
         let soup: Vec<_> = (0..count)
             .map(|_| {
                 let at = point(&mut rng);

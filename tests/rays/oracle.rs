@@ -13,10 +13,7 @@ pub(crate) struct Bracket {
 
 impl Bracket {
     fn none() -> Self {
-        Self {
-            earliest: f64::INFINITY,
-            latest: f64::INFINITY,
-        }
+        Self { earliest: f64::INFINITY, latest: f64::INFINITY }
     }
 
     /// Some hit at `t` give or take `error`; `sure` if no rounding can undo it.
@@ -36,12 +33,7 @@ impl Bracket {
 }
 
 fn exact(m: &Affine3A) -> DAffine3 {
-    DAffine3::from_cols(
-        m.matrix3.x_axis.as_dvec3(),
-        m.matrix3.y_axis.as_dvec3(),
-        m.matrix3.z_axis.as_dvec3(),
-        m.translation.as_dvec3(),
-    )
+    DAffine3::from_cols(m.matrix3.x_axis.as_dvec3(), m.matrix3.y_axis.as_dvec3(), m.matrix3.z_axis.as_dvec3(), m.translation.as_dvec3())
 }
 
 fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
@@ -134,10 +126,7 @@ pub(crate) fn check(primitives: &[Primitive], bvh: &Bvh, ray: &Ray) {
             let n = (*b - *a).cross(*c - *a).as_dvec3().normalize();
             let slant = n.dot(ray.d.as_dvec3().normalize()).abs();
             let apart = x.as_dvec3().distance(y.as_dvec3());
-            assert!(
-                apart * slant <= f64::from(slack),
-                "{ray:?}: {hit:?} {near}: {x} is not {y}"
-            );
+            assert!(apart * slant <= f64::from(slack), "{ray:?}: {hit:?} {near}: {x} is not {y}");
         }
     }
 }

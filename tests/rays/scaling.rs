@@ -6,22 +6,12 @@ use isophote::scene::accel::{Accel, Bvh, Primitive};
 use isophote::scene::ray::Ray;
 
 fn scaled(primitive: &Primitive, s: f32) -> Primitive {
-    let scale = |m: &Affine3A| Affine3A {
-        matrix3: m.matrix3 * s,
-        translation: m.translation * s,
-    };
+    let scale = |m: &Affine3A| Affine3A { matrix3: m.matrix3 * s, translation: m.translation * s };
     match primitive {
         Primitive::Triangle(corners) => Primitive::Triangle(corners.map(|c| c * s)),
-        Primitive::Sphere { center, radius } => Primitive::Sphere {
-            center: *center * s,
-            radius: radius * s,
-        },
-        Primitive::Disk { to_world } => Primitive::Disk {
-            to_world: scale(to_world),
-        },
-        Primitive::Cylinder { to_world } => Primitive::Cylinder {
-            to_world: scale(to_world),
-        },
+        Primitive::Sphere { center, radius } => Primitive::Sphere { center: *center * s, radius: radius * s },
+        Primitive::Disk { to_world } => Primitive::Disk { to_world: scale(to_world) },
+        Primitive::Cylinder { to_world } => Primitive::Cylinder { to_world: scale(to_world) },
     }
 }
 
@@ -37,26 +27,12 @@ fn powers_of_two_change_no_bit() {
         let larger = Bvh::build(&larger);
         for ray in &rays {
             let here = plain.closest(ray);
-            let moved = Ray {
-                o: ray.o * s,
-                d: ray.d,
-                t_max: ray.t_max * s,
-            };
+            let moved = Ray { o: ray.o * s, d: ray.d, t_max: ray.t_max * s };
             let there = larger.closest(&moved);
-            assert_eq!(
-                here.map(|h| (h.t * s, h.u, h.v, h.prim)),
-                there.map(|h| (h.t, h.u, h.v, h.prim))
-            );
-            let longer = Ray {
-                o: ray.o,
-                d: ray.d * s,
-                t_max: ray.t_max / s,
-            };
+            assert_eq!(here.map(|h| (h.t * s, h.u, h.v, h.prim)), there.map(|h| (h.t, h.u, h.v, h.prim)));
+            let longer = Ray { o: ray.o, d: ray.d * s, t_max: ray.t_max / s };
             let there = plain.closest(&longer);
-            assert_eq!(
-                here.map(|h| (h.t / s, h.u, h.v, h.prim)),
-                there.map(|h| (h.t, h.u, h.v, h.prim))
-            );
+            assert_eq!(here.map(|h| (h.t / s, h.u, h.v, h.prim)), there.map(|h| (h.t, h.u, h.v, h.prim)));
             assert_eq!(here.is_some(), plain.occluded(&longer));
         }
     }
@@ -81,9 +57,6 @@ fn millimetres_and_kilometres_are_alike() {
                 (a, b) => differ += u32::from(a.is_some() != b.is_some()),
             }
         }
-        assert!(
-            differ <= 2 && far <= 10,
-            "x {s}: {differ} differ, {far} elsewhere"
-        );
+        assert!(differ <= 2 && far <= 10, "x {s}: {differ} differ, {far} elsewhere");
     }
 }

@@ -42,12 +42,7 @@ impl Bvh {
     #[inline(always)]
     fn closest_on(&self, stack: &[Cell<u64>; DEEP], ray: &Ray) -> Option<RawHit> {
         let p = Probe::new(ray, self.reach)?;
-        let mut best = Best {
-            t: ray.t_max * p.to_scaled,
-            u: 0.0,
-            v: 0.0,
-            prim: EMPTY,
-        };
+        let mut best = Best { t: ray.t_max * p.to_scaled, u: 0.0, v: 0.0, prim: EMPTY };
         let mut top = 0;
         let mut at = self.root;
         if at == EMPTY || !(best.t > 0.0) {
@@ -67,10 +62,7 @@ impl Bvh {
                     }
                     let j = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
-                    let (a, b) = (
-                        entry(enter[i], node.child[i]),
-                        entry(enter[j], node.child[j]),
-                    );
+                    let (a, b) = (entry(enter[i], node.child[i]), entry(enter[j], node.child[j]));
                     self.fetch(node.child[i]);
                     self.fetch(node.child[j]);
                     let mut nearest = a.min(b);
@@ -119,12 +111,7 @@ impl Bvh {
     fn report(&self, p: &Probe, ray: &Ray, best: Best) -> Option<RawHit> {
         // The scaling is by a power of two; it can only lose bits, and the promise on t, at the ends of the range.
         let t = best.t * p.from_scaled;
-        (best.prim != EMPTY && t > 0.0 && t <= ray.t_max).then_some(RawHit {
-            t,
-            u: best.u,
-            v: best.v,
-            prim: best.prim,
-        })
+        (best.prim != EMPTY && t > 0.0 && t <= ray.t_max).then_some(RawHit { t, u: best.u, v: best.v, prim: best.prim })
     }
 
     /// See [`super::Accel::occluded`].
