@@ -14,22 +14,16 @@ impl Mesh {
     pub(crate) fn add(&mut self, other: &Mesh) {
         let base = self.corners.len() as u32;
         self.corners.extend(&other.corners);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + base)));
     }
 
     pub(crate) fn quad(&mut self, corners: [Vec3; 4]) {
-        self.add(&Mesh {
-            corners: corners.to_vec(),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
-        });
+        self.add(&Mesh { corners: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] });
     }
 
     /// The corners of each triangle.
     pub(crate) fn soup(&self) -> impl Iterator<Item = [Vec3; 3]> + '_ {
-        self.triangles
-            .iter()
-            .map(|t| t.map(|i| self.corners[i as usize]))
+        self.triangles.iter().map(|t| t.map(|i| self.corners[i as usize]))
     }
 }
 
@@ -54,15 +48,9 @@ pub(crate) fn bumpy(center: Vec3, radius: f32, bump: f32, rings: u32, around: u3
     let id = |ring: u32, step: u32| 1 + (ring - 1) * around + step % around;
     for step in 0..around {
         mesh.triangles.push([0, id(1, step), id(1, step + 1)]);
-        mesh.triangles
-            .push([south, id(rings - 1, step + 1), id(rings - 1, step)]);
+        mesh.triangles.push([south, id(rings - 1, step + 1), id(rings - 1, step)]);
         for ring in 1..rings - 1 {
-            let quad = [
-                id(ring, step),
-                id(ring + 1, step),
-                id(ring + 1, step + 1),
-                id(ring, step + 1),
-            ];
+            let quad = [id(ring, step), id(ring + 1, step), id(ring + 1, step + 1), id(ring, step + 1)];
             mesh.triangles.push([quad[0], quad[1], quad[2]]);
             mesh.triangles.push([quad[0], quad[2], quad[3]]);
         }
@@ -74,27 +62,13 @@ pub(crate) fn bumpy(center: Vec3, radius: f32, bump: f32, rings: u32, around: u3
 pub(crate) fn cuboid(min: Vec3, max: Vec3) -> Mesh {
     let corner = |i: u32| {
         let pick = |bit: u32, axis: usize| {
-            if i >> bit & 1 == 0 {
-                min[axis]
-            } else {
-                max[axis]
-            }
+            if i >> bit & 1 == 0 { min[axis] } else { max[axis] }
         };
         Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
     };
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     Mesh {
         corners: (0..8).map(corner).collect(),
-        triangles: faces
-            .iter()
-            .flat_map(|f: &[u32; 4]| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]])
-            .collect(),
+        triangles: faces.iter().flat_map(|f: &[u32; 4]| [[f[0], f[1], f[2]], [f[0], f[2], f[3]]]).collect(),
     }
 }

@@ -48,10 +48,7 @@ impl Analytic {
                 }
             }
             Shape::Disk { to_object } => {
-                let (o, d) = (
-                    to_object.transform_point3(o),
-                    to_object.transform_vector3(d),
-                );
+                let (o, d) = (to_object.transform_point3(o), to_object.transform_vector3(d));
                 let t = -o.z / d.z;
                 let (x, y) = (o.x + t * d.x, o.y + t * d.y);
                 if x * x + y * y <= 1.0 {
@@ -59,10 +56,7 @@ impl Analytic {
                 }
             }
             Shape::Cylinder { to_object } => {
-                let (o, d) = (
-                    to_object.transform_point3(o),
-                    to_object.transform_vector3(d),
-                );
+                let (o, d) = (to_object.transform_point3(o), to_object.transform_vector3(d));
                 let (a, h) = (d.x * d.x + d.y * d.y, o.x * d.x + o.y * d.y);
                 let c = o.x * o.x + o.y * o.y - 1.0;
                 let across = o.x * d.y - o.y * d.x;

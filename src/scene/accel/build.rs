@@ -5,10 +5,10 @@ use super::node::EMPTY;
 use super::tree::{Binary, Item, NO_CHILD, Split};
 use super::{Bounds, Bvh, DEEP, Primitive};
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
-use std::time::Duration;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     let mut items = Vec::with_capacity(primitives.len());
@@ -25,36 +25,17 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
                 boxes.push(bounds);
                 continue;
             }
-            Primitive::Sphere { center, radius } => Shape::Sphere {
-                center: center.as_dvec3(),
-                radius2: f64::from(*radius).powi(2),
-            },
-            Primitive::Disk { to_world } => Shape::Disk {
-                to_object: exact(to_world).inverse(),
-            },
-            Primitive::Cylinder { to_world } => Shape::Cylinder {
-                to_object: exact(to_world).inverse(),
-            },
+            Primitive::Sphere { center, radius } => Shape::Sphere { center: center.as_dvec3(), radius2: f64::from(*radius).powi(2) },
+            Primitive::Disk { to_world } => Shape::Disk { to_object: exact(to_world).inverse() },
+            Primitive::Cylinder { to_world } => Shape::Cylinder { to_object: exact(to_world).inverse() },
         };
         items.push(Item::Analytic(analytic.len() as u32));
         boxes.push(bounds);
-        analytic.push(Analytic {
-            shape,
-            prim: number,
-        });
+        analytic.push(Analytic { shape, prim: number });
     }
     analytic.shrink_to_fit();
     let Some(all) = boxes.iter().copied().reduce(union) else {
-        return Bvh {
-            nodes: Vec::new(),
-            triangles: Vec::new(),
-            analytic,
-            root: EMPTY,
-            stack: 0,
-            reach: 0.0,
-            bounds: None,
-            primitives: 0,
-        };
+        return Bvh { nodes: Vec::new(), triangles: Vec::new(), analytic, root: EMPTY, reach: 0.0, bounds: None, primitives: 0 };
     };
     let mut wide = by_area(&boxes).widen(&items);
     if wide.stack > DEEP {
@@ -67,7 +48,6 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
         triangles: wide.triangles,
         analytic,
         root: wide.root,
-        stack: wide.stack,
         reach: reach.x.max(reach.y).max(reach.z),
         bounds: Some(all),
         primitives: items.len(),
@@ -75,49 +55,37 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
 }
 
 fn union(a: Bounds, b: Bounds) -> Bounds {
-    Bounds {
-        min: a.min.min(b.min),
-        max: a.max.max(b.max),
-    }
+    Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }
 }
 
-/// By expected cost: locally-ordered clustering, then reinsertion (obvhs's medium preset).
+/// By expected cost: locally-ordered clustering, then reinsertion, as obvhs's medium preset has them. One primitive a
+/// leaf: which subtrees become leaves is decided together with the wide nodes.
 fn by_area(boxes: &[Bounds]) -> Binary {
-    let aabbs: Vec<_> = boxes
-        .iter()
-        .map(|b| Aabb::new(b.min.into(), b.max.into()))
-        .collect();
-    // One primitive a leaf: which subtrees become leaves is decided together with the wide nodes.
-    let params = BvhBuildParams {
-        max_prims_per_leaf: 1,
-        ..BvhBuildParams::medium_build()
-    };
-    let tree = build_bvh2(&aabbs, params, &mut Duration::default());
-    let split = |n: &obvhs::bvh2::node::Bvh2Node| {
-        let (a, b) = if n.is_leaf() {
-            (tree.primitive_indices[n.first_index as usize], NO_CHILD)
-        } else {
-            (n.first_index, n.first_index + 1)
-        };
-        let bounds = Bounds {
-            min: n.aabb.min.into(),
-            max: n.aabb.max.into(),
-        };
+    let aabbs: Vec<_> = boxes.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
+    let mut tree = PlocBuilder::with_capacity(aabbs.len()).build(
+        PlocSearchDistance::Medium,
+        &aabbs,
+        (0..aabbs.len() as u32).collect(),
+        SortPrecision::U64,
+        3,
+    );
+    let mut optimizer = ReinsertionOptimizer::default();
+    for share in [0.05, 0.1] {
+        optimizer.run(&mut tree, share, None);
+    }
+    let split = |n: &Bvh2Node| {
+        let (a, b) =
+            if n.is_leaf() { (tree.primitive_indices[n.first_index as usize], NO_CHILD) } else { (n.first_index, n.first_index + 1) };
+        let bounds = Bounds { min: n.aabb.min.into(), max: n.aabb.max.into() };
         Split { bounds, a, b }
     };
-    Binary {
-        nodes: tree.nodes.iter().map(split).collect(),
-    }
+    Binary { nodes: tree.nodes.iter().map(split).collect() }
 }
 
 /// By halving the list along the widest spread of centres: worse to walk, but never deeper than the logarithm.
 fn by_halves(boxes: &[Bounds]) -> Binary {
     let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
-    let blank = Split {
-        bounds: boxes[0],
-        a: 0,
-        b: NO_CHILD,
-    };
+    let blank = Split { bounds: boxes[0], a: 0, b: NO_CHILD };
     let mut nodes = vec![blank];
     let mut todo = vec![(0, 0..items.len())];
     while let Some((n, range)) = todo.pop() {
@@ -134,9 +102,7 @@ fn by_halves(boxes: &[Bounds]) -> Binary {
         } else {
             let axis = (high - low).max_position();
             let half = part.len() / 2;
-            part.select_nth_unstable_by(half, |i, j| {
-                center(i)[axis].total_cmp(&center(j)[axis]).then(i.cmp(j))
-            });
+            part.select_nth_unstable_by(half, |i, j| center(i)[axis].total_cmp(&center(j)[axis]).then(i.cmp(j)));
             let a = nodes.len();
             nodes.extend([blank; 2]);
             todo.push((a + 1, range.start + half..range.end));
@@ -149,28 +115,16 @@ fn by_halves(boxes: &[Bounds]) -> Binary {
 }
 
 fn exact(m: &Affine3A) -> DAffine3 {
-    DAffine3::from_cols(
-        m.matrix3.x_axis.as_dvec3(),
-        m.matrix3.y_axis.as_dvec3(),
-        m.matrix3.z_axis.as_dvec3(),
-        m.translation.as_dvec3(),
-    )
+    DAffine3::from_cols(m.matrix3.x_axis.as_dvec3(), m.matrix3.y_axis.as_dvec3(), m.matrix3.z_axis.as_dvec3(), m.translation.as_dvec3())
 }
 
 /// The f64 box, rounded outwards.
 fn outwards(min: DVec3, max: DVec3) -> Bounds {
     let below = |x: f64| {
-        if f64::from(x as f32) <= x {
-            x as f32
-        } else {
-            (x as f32).next_down()
-        }
+        if f64::from(x as f32) <= x { x as f32 } else { (x as f32).next_down() }
     };
     let above = |x: f64| -below(-x);
-    Bounds {
-        min: Vec3::new(below(min.x), below(min.y), below(min.z)),
-        max: Vec3::new(above(max.x), above(max.y), above(max.z)),
-    }
+    Bounds { min: Vec3::new(below(min.x), below(min.y), below(min.z)), max: Vec3::new(above(max.x), above(max.y), above(max.z)) }
 }
 
 /// The box around a primitive; none if no ray can hit it (`Bvh` lists why).
@@ -181,10 +135,7 @@ fn bounds(primitive: &Primitive) -> Option<Bounds> {
             if p.cross(q) == DVec3::ZERO {
                 return None;
             }
-            Bounds {
-                min: a.min(*b).min(*c),
-                max: a.max(*b).max(*c),
-            }
+            Bounds { min: a.min(*b).min(*c), max: a.max(*b).max(*c) }
         }
         Primitive::Sphere { center, radius } => {
             if !(*radius > 0.0) {
@@ -214,11 +165,7 @@ fn round(to_world: &Affine3A, heights: &[f64]) -> Option<Bounds> {
     let (x, y) = (m.matrix3.x_axis, m.matrix3.y_axis);
     let extent = (x * x + y * y).map(f64::sqrt);
     let center = |h: &f64| m.translation + m.matrix3.z_axis * *h;
-    let (min, max) = heights
-        .iter()
-        .map(center)
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), c| {
-            (min.min(c - extent), max.max(c + extent))
-        });
+    let (min, max) =
+        heights.iter().map(center).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), c| (min.min(c - extent), max.max(c + extent)));
     Some(outwards(min, max))
 }

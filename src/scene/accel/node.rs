@@ -23,12 +23,7 @@ pub(super) struct Node {
 impl Node {
     pub(super) const NONE: Self = {
         let empty = [f32x8::splat(f32::INFINITY), f32x8::splat(f32::NEG_INFINITY)];
-        Self {
-            x: empty,
-            y: empty,
-            z: empty,
-            child: [EMPTY; 8],
-        }
+        Self { x: empty, y: empty, z: empty, child: [EMPTY; 8] }
     };
 
     /// Which children the ray may meet before `t_max`, as bits, and where it enters each (never later than it does).

@@ -88,10 +88,7 @@ impl Probe {
             enters: inv.map(|c| usize::from(c < 0.0)),
             axis,
             origin: axis.map(|k| f32x4::splat(o[k])),
-            shear: [
-                f32x4::splat(dir[axis[0]] * inv_z),
-                f32x4::splat(dir[axis[1]] * inv_z),
-            ],
+            shear: [f32x4::splat(dir[axis[0]] * inv_z), f32x4::splat(dir[axis[1]] * inv_z)],
             inv_z: f32x4::splat(inv_z),
         })
     }

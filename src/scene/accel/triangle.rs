@@ -53,14 +53,7 @@ impl Tri4 {
             }
             f32x4::new(lanes)
         };
-        let corner = [0, 1, 2].map(|i| {
-            [
-                lane(&|t| t.1[i].x),
-                lane(&|t| t.1[i].y),
-                lane(&|t| t.1[i].z),
-                lane(&|t| f32::from_bits(t.0)),
-            ]
-        });
+        let corner = [0, 1, 2].map(|i| [lane(&|t| t.1[i].x), lane(&|t| t.1[i].y), lane(&|t| t.1[i].z), lane(&|t| f32::from_bits(t.0))]);
         Self { corner }
     }
 
@@ -85,8 +78,7 @@ impl Tri4 {
         let b = ax * cy - ay * cx;
         let c = bx * ay - by * ax;
         let zero = f32x4::ZERO;
-        let inside =
-            a.fast_min(b).fast_min(c).simd_ge(zero) | a.fast_max(b).fast_max(c).simd_le(zero);
+        let inside = a.fast_min(b).fast_min(c).simd_ge(zero) | a.fast_max(b).fast_max(c).simd_le(zero);
         if inside.to_bitmask() == 0 {
             return None;
         }
@@ -99,12 +91,7 @@ impl Tri4 {
         let hit = inside & (doubtful | t.simd_gt(zero)) & t.simd_le(f32x4::splat(t_max));
         let mask = hit.to_bitmask();
         (mask != 0).then(|| {
-            let four = Four {
-                t: t.to_array(),
-                u: (b * scale).to_array(),
-                v: (c * scale).to_array(),
-                doubtful: doubtful.to_bitmask(),
-            };
+            let four = Four { t: t.to_array(), u: (b * scale).to_array(), v: (c * scale).to_array(), doubtful: doubtful.to_bitmask() };
             (mask, four)
         })
     }
@@ -142,6 +129,13 @@ impl Tri4 {
                 t > 0.0 && t <= t_max
             }
         })
+    }
+
+    #[inline(always)]
+    pub(super) fn fetch(&self) {
+        for corner in &self.corner {
+            safe_arch::prefetch_t0(corner);
+        }
     }
 
     #[inline(always)]

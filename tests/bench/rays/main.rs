@@ -37,11 +37,7 @@ impl Embree {
         };
         let file = tempfile::NamedTempFile::new()?;
         work.write(&mut BufWriter::new(File::create(file.path())?))?;
-        let mut child = Command::new(program)
-            .arg(file.path())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()?;
+        let mut child = Command::new(program).arg(file.path()).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let ask = child.stdin.take().ok_or("no pipe")?;
         let mut answer = BufReader::new(child.stdout.take().ok_or("no pipe")?);
         let mut ready = String::new();
@@ -84,10 +80,7 @@ fn ours(bvh: &Bvh, set: &Set) -> Round {
         }
     }
     std::hint::black_box(sum);
-    Round {
-        seconds: start.elapsed().as_secs_f64(),
-        hits,
-    }
+    Round { seconds: start.elapsed().as_secs_f64(), hits }
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -99,9 +92,7 @@ fn main() -> Outcome<()> {
     let rounds: usize = env::var("RAYS_ROUNDS").map_or(Ok(9), |r| r.parse())?;
     let scenes = env::var("RAYS_SCENES").unwrap_or_else(|_| "32 70k 1m".into());
     let mut ratios = Vec::new();
-    println!(
-        "scene  set      rays     ours Mray/s  Embree Mray/s  ratio (quartiles)    misses ours / Embree"
-    );
+    println!("scene  set      rays     ours Mray/s  Embree Mray/s  ratio (quartiles)    misses ours / Embree");
     for name in scenes.split_whitespace() {
         let mesh = workload::scene(name).ok_or_else(|| format!("no scene {name}"))?;
         let primitives: Vec<_> = mesh.soup().map(Primitive::Triangle).collect();

@@ -35,18 +35,10 @@ pub(crate) fn scene(name: &str) -> Option<Mesh> {
     room.quad([v(0., 1., 0.), v(1., 1., 0.), v(1., 1., 1.), v(0., 1., 1.)]);
     room.quad([v(0., 0., 0.), v(0., 1., 0.), v(0., 1., 1.), v(0., 0., 1.)]);
     room.quad([v(1., 0., 0.), v(1., 0., 1.), v(1., 1., 1.), v(1., 1., 0.)]);
-    room.quad([
-        v(0.35, 0.35, 0.999),
-        v(0.65, 0.35, 0.999),
-        v(0.65, 0.65, 0.999),
-        v(0.35, 0.65, 0.999),
-    ]);
+    room.quad([v(0.35, 0.35, 0.999), v(0.65, 0.35, 0.999), v(0.65, 0.65, 0.999), v(0.35, 0.65, 0.999)]);
     let rings = match name {
         "32" => {
-            for (a, b) in [
-                (v(0.2, 0.5, 0.), v(0.45, 0.75, 0.6)),
-                (v(0.55, 0.2, 0.), v(0.8, 0.45, 0.3)),
-            ] {
+            for (a, b) in [(v(0.2, 0.5, 0.), v(0.45, 0.75, 0.6)), (v(0.55, 0.2, 0.), v(0.8, 0.45, 0.3))] {
                 let mut block = cuboid(a, b);
                 block.triangles.drain(0..2);
                 room.add(&block);
@@ -74,10 +66,7 @@ impl Workload {
             for i in 0..64 {
                 let x = ((x0 + i % 8) as f32 + 0.5) / SIDE as f32 - 0.5;
                 let y = ((y0 + i / 8) as f32 + 0.5) / SIDE as f32 - 0.5;
-                primary.push(Ray::new(
-                    Vec3::new(0.5, -1.2, 0.5),
-                    Vec3::new(x, 1.2, y).normalize(),
-                ));
+                primary.push(Ray::new(Vec3::new(0.5, -1.2, 0.5), Vec3::new(x, 1.2, y).normalize()));
             }
         }
         let (mut bounce, mut shadow) = (Vec::new(), Vec::new());
@@ -93,17 +82,9 @@ impl Workload {
                 let n = if n.dot(ray.d) > 0.0 { -n } else { n };
                 let o = ray.o + ray.d * hit.t + n * 1e-5;
                 next.push(Ray::new(o, cosine(n, &mut rng)));
-                let light = Vec3::new(
-                    0.35 + 0.3 * rng.random::<f32>(),
-                    0.35 + 0.3 * rng.random::<f32>(),
-                    0.9985,
-                );
+                let light = Vec3::new(0.35 + 0.3 * rng.random::<f32>(), 0.35 + 0.3 * rng.random::<f32>(), 0.9985);
                 if depth >= 2 {
-                    shadow.push(Ray {
-                        o,
-                        d: light - o,
-                        t_max: 0.9999,
-                    });
+                    shadow.push(Ray { o, d: light - o, t_max: 0.9999 });
                 }
             }
             if depth >= 2 {
@@ -117,43 +98,19 @@ impl Workload {
             *rays = rays.iter().step_by(step).copied().collect();
         }
         let mut sets = vec![
-            Set {
-                name: "primary",
-                any: false,
-                rays: primary,
-            },
-            Set {
-                name: "bounce",
-                any: false,
-                rays: bounce,
-            },
-            Set {
-                name: "shadow",
-                any: true,
-                rays: shadow,
-            },
+            Set { name: "primary", any: false, rays: primary },
+            Set { name: "bounce", any: false, rays: bounce },
+            Set { name: "shadow", any: true, rays: shadow },
         ];
         if name == "70k" {
-            sets.push(Set {
-                name: "edges",
-                any: false,
-                rays: edges(&mesh, &mut rng),
-            });
+            sets.push(Set { name: "edges", any: false, rays: edges(&mesh, &mut rng) });
         }
         Self { mesh, sets }
     }
 
     pub(crate) fn write(&self, to: &mut impl Write) -> io::Result<()> {
-        let mut put = |words: &[u32]| {
-            words
-                .iter()
-                .try_for_each(|w| to.write_all(&w.to_ne_bytes()))
-        };
-        put(&[
-            self.mesh.corners.len() as u32,
-            self.mesh.triangles.len() as u32,
-            self.sets.len() as u32,
-        ])?;
+        let mut put = |words: &[u32]| words.iter().try_for_each(|w| to.write_all(&w.to_ne_bytes()));
+        put(&[self.mesh.corners.len() as u32, self.mesh.triangles.len() as u32, self.sets.len() as u32])?;
         for c in &self.mesh.corners {
             put(&c.to_array().map(f32::to_bits))?;
         }
@@ -179,20 +136,12 @@ fn edges(mesh: &Mesh, rng: &mut Pcg64Mcg) -> Vec<Ray> {
     (0..1_000_000)
         .map(|i| {
             let t = ball[rng.random_range(0..ball.len())].map(|i| mesh.corners[i as usize]);
-            let at = if i % 2 == 0 {
-                t[0]
-            } else {
-                t[0].lerp(t[1], rng.random())
-            };
+            let at = if i % 2 == 0 { t[0] } else { t[0].lerp(t[1], rng.random()) };
             let mut random = || Vec3::new(rng.random(), rng.random(), rng.random());
             let o = center + (random() - 0.5) * 0.08;
             let d = at - o;
             // The wall behind would stop a ray that leaked.
-            Ray {
-                o,
-                d,
-                t_max: 1.0 + 1e-3,
-            }
+            Ray { o, d, t_max: 1.0 + 1e-3 }
         })
         .collect()
 }
