@@ -125,11 +125,11 @@ fn splats_measure_what_rays_see() {
         let mut numbers = stream(100 + index as u64);
         let (pixels, size) = (camera.resolution().0 * camera.resolution().1, camera.resolution());
         let center = camera.ray(Vec2::new(size.0 as f32, size.1 as f32) * 0.5, Vec2::splat(0.5));
-        let (middle, side) = (center.end.p + center.ray.d * 4.0, 1.5f32);
+        let (middle, side) = (center.end.p + center.ray.d * 4.0, 4.5f32);
         let n = -camera.forward();
         let (s, t) = n.any_orthonormal_pair();
         let (mut eye, mut light) = (Mean::default(), Mean::default());
-        for _ in 0..4000 {
+        for _ in 0..20_000 {
             let film = pair(&mut numbers) * Vec2::new(size.0 as f32, size.1 as f32);
             let ray = camera.ray(film, pair(&mut numbers));
             let on_plane = ray.end.p + ray.ray.d * ((middle - ray.end.p).dot(n) / ray.ray.d.dot(n));
