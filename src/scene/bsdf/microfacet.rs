@@ -19,7 +19,7 @@ pub enum MicrofacetKind {
 /// How normals are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NormalSampling {
-    /// Those seen from the given direction, in proportion to what is seen of them ([HEITZ14V]).
+    /// Those seen from the given direction, in proportion to what is seen of them (\[HEITZ14V\]).
     Visible,
     /// All of them, in proportion to their projected area.
     All,
@@ -40,6 +40,9 @@ pub struct Microfacet {
 
 /// The smoothest surface that 32-bit arithmetic bears; Mitsuba raises smaller values to it.
 pub const MIN_ALPHA: f32 = 1e-4;
+
+/// Below this cosine a facet counts as seen edge on: densities per steradian, up to `1/(pi MIN_ALPHA^2 EDGE_ON)`, stay finite.
+pub(super) const EDGE_ON: f32 = 1e-20;
 
 impl Microfacet {
     /// Roughness as [`super::Lobes`] counts it.
@@ -82,7 +85,7 @@ impl Microfacet {
 
     /// `G1(w)/|w.z|` as values use it; finite at grazing angles. The facet must be seen from its front.
     ///
-    /// For Beckmann, [WALTER07]'s rational fit (27), as Mitsuba has it.
+    /// For Beckmann, \[WALTER07\]'s rational fit (27), as Mitsuba has it.
     #[inline(always)]
     pub fn g1_over_cos(&self, w: Vec3) -> f32 {
         let (cos, s) = (w.z.abs(), self.stretched(w));
@@ -118,8 +121,8 @@ impl Microfacet {
     pub fn reflection_pdf(&self, w: Vec3, h: Vec3, cos_h: f32, d: f32) -> f32 {
         match self.sampling {
             NormalSampling::Visible => 0.25 * d * self.exact_g1_over_cos(w),
-            // A facet seen from its back reflects nothing.
-            NormalSampling::All if cos_h > 0.0 => 0.25 * d * h.z / cos_h,
+            // A facet seen from its back reflects nothing, and one seen edge on would have a density beyond what numbers hold.
+            NormalSampling::All if cos_h > EDGE_ON => 0.25 * d * h.z / cos_h,
             NormalSampling::All => 0.0,
         }
     }
@@ -142,7 +145,7 @@ impl Microfacet {
         }
     }
 
-    /// The visible part of a stretched sphere is, seen in the mirror, a spherical cap: [DUPUY23].
+    /// The visible part of a stretched sphere is, seen in the mirror, a spherical cap: \[DUPUY23\].
     #[inline(always)]
     fn sample_visible_ggx(&self, w: Vec3, u: Vec2) -> Vec3 {
         let stretched = Vec3::new(w.x * self.alpha_u, w.y * self.alpha_v, w.z).normalize();
