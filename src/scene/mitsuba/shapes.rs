@@ -15,6 +15,9 @@ pub(super) const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Geometr
 
 const NOTED: &[(&str, &str)] = &[("silhouette_sampling_weight", "it matters to differentiable rendering only")];
 
+/// A flat shape has one normal whatever is asked for.
+const NOTED_FLAT: &[(&str, &str)] = &[NOTED[0], ("face_normals", "a rectangle is flat already")];
+
 impl Builder<'_> {
     /// A shape of the scene with its material and, if it shines, its radiance.
     pub(super) fn shape(&mut self, plugin: &Plugin) -> Result<()> {
@@ -39,7 +42,8 @@ impl Builder<'_> {
             }
         };
         let geometry = construct(self, plugin)?;
-        self.finish(plugin, NOTED)?;
+        let flat = plugin.type_name == "rectangle";
+        self.finish(plugin, if flat { NOTED_FLAT } else { NOTED })?;
         let name = plugin.id.clone().unwrap_or_else(|| format!("{} {}", plugin.type_name, self.shapes.len()));
         self.shapes.push(Shape { name, geometry, bsdf, radiance });
         Ok(())
@@ -67,7 +71,12 @@ fn rectangle(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {
 }
 
 fn cube(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {
-    Ok(Geometry::Mesh(Mesh::cube(to_world(plugin)?, flip_normals(plugin)?)))
+    let mut mesh = Mesh::cube(to_world(plugin)?, flip_normals(plugin)?);
+    // Seen only where to_world mirrors: the shading normals stay outside, those of the faces turn with the winding.
+    if plugin.boolean("face_normals", false)? {
+        mesh.normals = None;
+    }
+    Ok(Geometry::Mesh(mesh))
 }
 
 fn sphere(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {

@@ -117,7 +117,7 @@ impl Reader<'_> {
         }
         let text = self.text(path, named)?;
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &e))?;
+        let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &text, &e))?;
 
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
         let mut folders = vec![folder];
@@ -212,8 +212,9 @@ impl Reader<'_> {
     fn contents(&mut self, source: &Source<'_>, node: Node<'_, '_>, owner: PluginId, depth: usize) -> Result<()> {
         for child in node.children() {
             if child.is_text() && child.text().is_some_and(|t| !t.trim().is_empty()) {
-                let at = source.at(child);
-                let shown = excerpt(child.text().unwrap_or_default().trim());
+                let text = child.text().unwrap_or_default();
+                let at = source.position(child.range().start + (text.len() - text.trim_start().len()));
+                let shown = excerpt(text.trim());
                 return Err(SceneError::new(&at, format!("stray text \"{shown}\"")).help("values stand in attributes, remarks in <!-- -->"));
             }
             if child.is_element() {
@@ -581,15 +582,20 @@ fn value_of(element: &str, node: Node<'_, '_>, attributes: &[Attribute<'_>], at:
     Ok((value, a.position.clone()))
 }
 
-fn syntax_error(path: &Path, e: &roxmltree::Error) -> SceneError {
+fn syntax_error(path: &Path, text: &str, e: &roxmltree::Error) -> SceneError {
+    let line_of = |byte: usize| text.as_bytes()[..byte].iter().filter(|b| **b == b'\n').count() as u32 + 1;
     let position = match e {
-        roxmltree::Error::DtdDetected
-        | roxmltree::Error::NodesLimitReached
-        | roxmltree::Error::NoRootNode
-        | roxmltree::Error::UnclosedRootNode => Position::line(path, 1),
+        roxmltree::Error::DtdDetected => Position::line(path, line_of(text.find("<!DOCTYPE").unwrap_or(0))),
+        // Something is missing at the end.
+        roxmltree::Error::NodesLimitReached | roxmltree::Error::NoRootNode | roxmltree::Error::UnclosedRootNode => {
+            Position::line(path, line_of(text.trim_end().len()))
+        }
         _ => Position { file: Arc::from(path), line: Some(e.pos().row), column: Some(e.pos().col) },
     };
-    let error = SceneError::new(&position, format!("not well-formed XML: {e}"));
+    // The parser's own message ends with the position, which stands in front already.
+    let message = e.to_string();
+    let message = message.rsplit_once(" at ").filter(|(_, place)| place.contains(':')).map_or(message.as_str(), |(before, _)| before);
+    let error = SceneError::new(&position, format!("not well-formed XML: {message}"));
     match e {
         roxmltree::Error::DtdDetected => error.help("document types and entities are not read; use <default> and $name"),
         roxmltree::Error::UnclosedRootNode => error.help("an element is not closed; the file may be cut off"),
