@@ -587,7 +587,10 @@ fn syntax_error(path: &Path, text: &str, e: &roxmltree::Error) -> SceneError {
     let position = match e {
         roxmltree::Error::DtdDetected => Position::line(path, line_of(text.find("<!DOCTYPE").unwrap_or(0))),
         // Something is missing at the end.
-        roxmltree::Error::NodesLimitReached | roxmltree::Error::NoRootNode | roxmltree::Error::UnclosedRootNode => {
+        roxmltree::Error::NodesLimitReached
+        | roxmltree::Error::NoRootNode
+        | roxmltree::Error::UnclosedRootNode
+        | roxmltree::Error::UnexpectedEndOfStream => {
             Position::line(path, line_of(text.trim_end().len()))
         }
         _ => Position { file: Arc::from(path), line: Some(e.pos().row), column: Some(e.pos().col) },
