@@ -72,17 +72,13 @@ pub struct Bvh {
     analytic: Vec<Analytic>,
     /// How to reach the first node; `node::EMPTY` for no primitives at all.
     root: u32,
-    /// Entries the walk's stack needs in the worst case.
-    stack: usize,
     /// Largest absolute coordinate of the bounds: what rounding errors are measured against.
     reach: f32,
     bounds: Option<Bounds>,
     primitives: usize,
 }
 
-/// Stack entries when the tree is of usual depth: a million triangles need about 50.
-const SHALLOW: usize = 64;
-/// Stack entries for any tree at all: `build` sees to it that none needs more.
+/// Stack entries of a walk: a million triangles need about 80, and `build` sees to it that no tree needs more.
 const DEEP: usize = 512;
 
 impl Bvh {
@@ -111,10 +107,10 @@ impl Bvh {
 
 impl Accel for Bvh {
     fn closest(&self, ray: &Ray) -> Option<RawHit> {
-        if self.stack <= SHALLOW { self.closest_within::<SHALLOW>(ray) } else { self.closest_within::<DEEP>(ray) }
+        self.find_closest(ray)
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        if self.stack <= SHALLOW { self.occluded_within::<SHALLOW>(ray) } else { self.occluded_within::<DEEP>(ray) }
+        self.find_any(ray)
     }
 }

@@ -5,10 +5,10 @@ use super::node::EMPTY;
 use super::tree::{Binary, Item, NO_CHILD, Split};
 use super::{Bounds, Bvh, DEEP, Primitive};
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::bvh2::builder::build_bvh2;
-use std::time::Duration;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     let mut items = Vec::with_capacity(primitives.len());
@@ -35,7 +35,7 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     }
     analytic.shrink_to_fit();
     let Some(all) = boxes.iter().copied().reduce(union) else {
-        return Bvh { nodes: Vec::new(), triangles: Vec::new(), analytic, root: EMPTY, stack: 0, reach: 0.0, bounds: None, primitives: 0 };
+        return Bvh { nodes: Vec::new(), triangles: Vec::new(), analytic, root: EMPTY, reach: 0.0, bounds: None, primitives: 0 };
     };
     let mut wide = by_area(&boxes).widen(&items);
     if wide.stack > DEEP {
@@ -48,7 +48,6 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
         triangles: wide.triangles,
         analytic,
         root: wide.root,
-        stack: wide.stack,
         reach: reach.x.max(reach.y).max(reach.z),
         bounds: Some(all),
         primitives: items.len(),
@@ -59,13 +58,22 @@ fn union(a: Bounds, b: Bounds) -> Bounds {
     Bounds { min: a.min.min(b.min), max: a.max.max(b.max) }
 }
 
-/// By expected cost: locally-ordered clustering, then reinsertion (obvhs's medium preset).
+/// By expected cost: locally-ordered clustering, then reinsertion, as obvhs's medium preset has them. One primitive a
+/// leaf: which subtrees become leaves is decided together with the wide nodes.
 fn by_area(boxes: &[Bounds]) -> Binary {
     let aabbs: Vec<_> = boxes.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
-    // One primitive a leaf: which subtrees become leaves is decided together with the wide nodes.
-    let params = BvhBuildParams { max_prims_per_leaf: 1, ..BvhBuildParams::medium_build() };
-    let tree = build_bvh2(&aabbs, params, &mut Duration::default());
-    let split = |n: &obvhs::bvh2::node::Bvh2Node| {
+    let mut tree = PlocBuilder::with_capacity(aabbs.len()).build(
+        PlocSearchDistance::Medium,
+        &aabbs,
+        (0..aabbs.len() as u32).collect(),
+        SortPrecision::U64,
+        3,
+    );
+    let mut optimizer = ReinsertionOptimizer::default();
+    for share in [0.05, 0.1] {
+        optimizer.run(&mut tree, share, None);
+    }
+    let split = |n: &Bvh2Node| {
         let (a, b) =
             if n.is_leaf() { (tree.primitive_indices[n.first_index as usize], NO_CHILD) } else { (n.first_index, n.first_index + 1) };
         let bounds = Bounds { min: n.aabb.min.into(), max: n.aabb.max.into() };

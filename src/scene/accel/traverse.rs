@@ -3,7 +3,13 @@
 use super::node::{ANALYTIC, EMPTY, LEAF};
 use super::probe::Probe;
 use super::triangle::Best;
-use super::{Bvh, RawHit, Ray};
+use super::{Bvh, DEEP, RawHit, Ray};
+use std::cell::Cell;
+
+thread_local! {
+    /// What is still to be visited. Kept with the thread, since clearing a fresh one costs more than a short walk.
+    static STACK: [Cell<u64>; DEEP] = const { [const { Cell::new(0) }; DEEP] };
+}
 
 /// Entry distance above, child below: as both are non-negative, entries sort as integers.
 #[inline(always)]
@@ -12,12 +18,31 @@ fn entry(t: f32, child: u32) -> u64 {
 }
 
 impl Bvh {
-    /// `STACK` must be at least `self.stack`.
+    /// Starts fetching a child that will be visited soon.
     #[inline(always)]
-    pub(super) fn closest_within<const STACK: usize>(&self, ray: &Ray) -> Option<RawHit> {
+    fn fetch(&self, child: u32) {
+        if child & LEAF == 0 {
+            if let Some(n) = self.nodes.get(child as usize) {
+                safe_arch::prefetch_t0(&n.x);
+                safe_arch::prefetch_t0(&n.y);
+                safe_arch::prefetch_t0(&n.z);
+                safe_arch::prefetch_t0(&n.child);
+            }
+        } else if let Some(t) = self.triangles.get((child & !LEAF) as usize) {
+            t.fetch();
+        }
+    }
+
+    /// See [`super::Accel::closest`].
+    #[inline(always)]
+    pub(super) fn find_closest(&self, ray: &Ray) -> Option<RawHit> {
+        STACK.with(|stack| self.closest_on(stack, ray))
+    }
+
+    #[inline(always)]
+    fn closest_on(&self, stack: &[Cell<u64>; DEEP], ray: &Ray) -> Option<RawHit> {
         let p = Probe::new(ray, self.reach)?;
         let mut best = Best { t: ray.t_max * p.to_scaled, u: 0.0, v: 0.0, prim: EMPTY };
-        let mut stack = [0u64; STACK];
         let mut top = 0;
         let mut at = self.root;
         if at == EMPTY || !(best.t > 0.0) {
@@ -38,22 +63,25 @@ impl Bvh {
                     let j = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     let (a, b) = (entry(enter[i], node.child[i]), entry(enter[j], node.child[j]));
+                    self.fetch(node.child[i]);
+                    self.fetch(node.child[j]);
                     let mut nearest = a.min(b);
-                    stack[top] = a.max(b);
+                    stack[top].set(a.max(b));
                     let base = top;
                     top += 1;
                     while mask != 0 {
                         let i = mask.trailing_zeros() as usize & 7;
                         mask &= mask - 1;
                         let next = entry(enter[i], node.child[i]);
-                        let mut carried = next.max(nearest);
+                        self.fetch(node.child[i]);
+                        let farther = next.max(nearest);
                         nearest = next.min(nearest);
                         let mut k = top;
-                        while k > base && stack[k - 1] < carried {
-                            stack[k] = stack[k - 1];
+                        while k > base && stack[k - 1].get() < farther {
+                            stack[k].set(stack[k - 1].get());
                             k -= 1;
                         }
-                        std::mem::swap(&mut stack[k], &mut carried);
+                        stack[k].set(farther);
                         top += 1;
                     }
                     at = nearest as u32;
@@ -70,7 +98,7 @@ impl Bvh {
                     return self.report(&p, ray, best);
                 }
                 top -= 1;
-                let next = stack[top];
+                let next = stack[top].get();
                 if f32::from_bits((next >> 32) as u32) <= best.t {
                     at = next as u32;
                     break;
@@ -86,14 +114,18 @@ impl Bvh {
         (best.prim != EMPTY && t > 0.0 && t <= ray.t_max).then_some(RawHit { t, u: best.u, v: best.v, prim: best.prim })
     }
 
-    /// `STACK` must be at least `self.stack`.
+    /// See [`super::Accel::occluded`].
     #[inline(always)]
-    pub(super) fn occluded_within<const STACK: usize>(&self, ray: &Ray) -> bool {
+    pub(super) fn find_any(&self, ray: &Ray) -> bool {
+        STACK.with(|stack| self.any_on(stack, ray))
+    }
+
+    #[inline(always)]
+    fn any_on(&self, stack: &[Cell<u64>; DEEP], ray: &Ray) -> bool {
         let Some(p) = Probe::new(ray, self.reach) else {
             return false;
         };
         let t_max = ray.t_max * p.to_scaled;
-        let mut stack = [0u32; STACK];
         let mut top = 0;
         let mut at = self.root;
         if at == EMPTY || !(t_max > 0.0) {
@@ -107,10 +139,11 @@ impl Bvh {
                     loop {
                         at = node.child[mask.trailing_zeros() as usize & 7];
                         mask &= mask - 1;
+                        self.fetch(at);
                         if mask == 0 {
                             break;
                         }
-                        stack[top] = at;
+                        stack[top].set(u64::from(at));
                         top += 1;
                     }
                     continue;
@@ -126,7 +159,7 @@ impl Bvh {
                 return false;
             }
             top -= 1;
-            at = stack[top];
+            at = stack[top].get() as u32;
         }
     }
 }

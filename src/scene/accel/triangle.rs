@@ -132,6 +132,13 @@ impl Tri4 {
     }
 
     #[inline(always)]
+    pub(super) fn fetch(&self) {
+        for corner in &self.corner {
+            safe_arch::prefetch_t0(corner);
+        }
+    }
+
+    #[inline(always)]
     fn number(&self, lane: usize) -> u32 {
         self.corner[0][3].as_array()[lane].to_bits()
     }
