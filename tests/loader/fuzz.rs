@@ -39,8 +39,26 @@ const MESH: &str = "# a quad and a triangle\no thing\nv 0 0 0\nv 1 0 0\nv 1 1 0\
 /// One to four changes of a kind that finds other errors than noise does: bytes of the file itself, digits, and structure.
 fn mutate(text: &[u8], random: &mut Pcg64) -> Vec<u8> {
     const TOKENS: [&[u8]; 20] = [
-        b"$", b"\"", b"<", b">", b"/>", b"-1", b"1e39", b"nan", b"0", b"99999999999999999999", b"&a;", b"\0", b"\xff", b"<!--", b"</scene>", b"<ref id=\"two\"/>", b"f -9 1 1\n", b"id=\"two\" ",
-        b"<include filename=\"scene.xml\"/>", b"$spp",
+        b"$",
+        b"\"",
+        b"<",
+        b">",
+        b"/>",
+        b"-1",
+        b"1e39",
+        b"nan",
+        b"0",
+        b"99999999999999999999",
+        b"&a;",
+        b"\0",
+        b"\xff",
+        b"<!--",
+        b"</scene>",
+        b"<ref id=\"two\"/>",
+        b"f -9 1 1\n",
+        b"id=\"two\" ",
+        b"<include filename=\"scene.xml\"/>",
+        b"$spp",
     ];
     let mut out = text.to_vec();
     for _ in 0..random.random_range(1..=4) {

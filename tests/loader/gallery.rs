@@ -75,7 +75,8 @@ fn every_malformed_input_gives_an_error_with_its_place() {
 #[test]
 fn only_files_without_a_line_at_fault_have_none() {
     // What has no line: OBJ files that lack something as a whole.
-    let without: Vec<String> = cases().into_iter().filter(|case| case.line.is_none() && !case.file.starts_with("image/")).map(|case| case.file).collect();
+    let without: Vec<String> =
+        cases().into_iter().filter(|case| case.line.is_none() && !case.file.starts_with("image/")).map(|case| case.file).collect();
     assert_eq!(without, ["empty", "blank", "only-vertices", "only-remarks", "only-lines", "flat"].map(|name| format!("obj/{name}.obj")));
 }
 

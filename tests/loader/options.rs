@@ -30,7 +30,8 @@ fn defaults_are_overridden_by_defines() {
 
 #[test]
 fn names_fill_any_attribute_in_any_place() {
-    let text = "<default name=\"kind\" value=\"sph\"/><default name=\"name\" value=\"rad\"/><shape type=\"${}\"/>".replace("${}", "$kindere");
+    let text =
+        "<default name=\"kind\" value=\"sph\"/><default name=\"name\" value=\"rad\"/><shape type=\"${}\"/>".replace("${}", "$kindere");
     assert!(with(&text, &[]).is_ok(), "$kind is the longest known name in $kindere");
     let both = "<default name=\"r\" value=\"1\"/><default name=\"rs\" value=\"2\"/><shape type=\"sphere\"><float name=\"radius\" value=\"$rs\"/></shape>";
     assert_eq!(radius(&with(both, &[]).unwrap()), 2.0);
@@ -47,12 +48,20 @@ fn unknown_defines_are_errors() {
 
 #[test]
 fn included_files_resolve_their_own_files_and_see_the_defaults() {
-    let main = scene("<default name=\"r\" value=\"4\"/><include filename=\"parts/ball.xml\"/><shape type=\"cube\"><include filename=\"parts/grey.xml\"/></shape>");
+    let main = scene(
+        "<default name=\"r\" value=\"4\"/><include filename=\"parts/ball.xml\"/><shape type=\"cube\"><include filename=\"parts/grey.xml\"/></shape>",
+    );
     let ball = "<scene version=\"3.0.0\"><default name=\"r\" value=\"9\"/><shape type=\"sphere\"><float name=\"radius\" value=\"$r\"/></shape>\
                 <shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape><shape type=\"obj\"><string name=\"filename\" value=\"top.obj\"/></shape></scene>";
     let grey = "<bsdf version=\"3.0.0\" type=\"conductor\"/>";
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    let files = [("scene.xml", main.as_str()), ("parts/ball.xml", ball), ("parts/grey.xml", grey), ("parts/a.obj", triangle), ("top.obj", triangle)];
+    let files = [
+        ("scene.xml", main.as_str()),
+        ("parts/ball.xml", ball),
+        ("parts/grey.xml", grey),
+        ("parts/a.obj", triangle),
+        ("top.obj", triangle),
+    ];
     let loaded = load_files(&files, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(radius(&loaded), 4.0);
     assert_eq!(loaded.parts.shapes.len(), 4);
@@ -62,7 +71,10 @@ fn included_files_resolve_their_own_files_and_see_the_defaults() {
 
 #[test]
 fn errors_in_included_files_name_both_places() {
-    let files = [("scene.xml", scene("<include filename=\"b.xml\"/>")), ("b.xml", "<scene version=\"3.0.0\">\n<shape type=\"bal\"/></scene>".to_owned())];
+    let files = [
+        ("scene.xml", scene("<include filename=\"b.xml\"/>")),
+        ("b.xml", "<scene version=\"3.0.0\">\n<shape type=\"bal\"/></scene>".to_owned()),
+    ];
     let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
     let error = load_files(&files, &LoadOptions::default()).unwrap_err();
     // The wrong type is found when everything is read, the wrong element while the file is.
@@ -96,7 +108,9 @@ fn the_command_line_sets_resolution_and_crop() {
 #[test]
 fn the_hash_is_over_contents_and_nothing_else() {
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    let xml = scene("<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape><shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>");
+    let xml = scene(
+        "<shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape><shape type=\"obj\"><string name=\"filename\" value=\"a.obj\"/></shape>",
+    );
     let hash = |name: &str, xml: &str, obj: &str, options: &LoadOptions| {
         let loaded = load_files(&[(name, xml), ("a.obj", obj)], options).unwrap();
         assert_eq!(loaded.files.len(), 2, "a file named twice is read once");

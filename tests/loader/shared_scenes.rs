@@ -20,7 +20,11 @@ fn the_shared_scenes_load() {
         assert_eq!(loaded.defaults.sample_count, 64);
         assert_eq!(loaded.defaults.integrator.as_deref(), Some("path"));
         // Each of them asks for a tent filter, and for nothing else that is not done.
-        assert!(loaded.notes.iter().all(|n| n.message.contains("rfilter") || n.message.contains("not used") || n.message.contains("no area")), "{:?}", loaded.notes);
+        assert!(
+            loaded.notes.iter().all(|n| n.message.contains("rfilter") || n.message.contains("not used") || n.message.contains("no area")),
+            "{:?}",
+            loaded.notes
+        );
         for note in &loaded.notes {
             eprintln!("  {note}");
         }

@@ -45,7 +45,9 @@ fn assert_colour(texture: &Texture, expected: [f32; 3]) {
 #[test]
 fn numbers_are_parted_by_blanks_or_commas() {
     for value in ["0.1 0.2 0.3", "0.1,0.2,0.3", ".1, .2, .3", " 1e-1\n2e-1\t3e-1 "] {
-        let Bsdf::Diffuse(b) = bsdf(&format!("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"{value}\"/></bsdf>")) else { panic!() };
+        let Bsdf::Diffuse(b) = bsdf(&format!("<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"{value}\"/></bsdf>")) else {
+            panic!()
+        };
         assert_colour(&b.reflectance, [0.1, 0.2, 0.3]);
     }
 }
@@ -53,7 +55,9 @@ fn numbers_are_parted_by_blanks_or_commas() {
 #[test]
 fn colours_may_be_one_number() {
     for element in ["rgb", "float", "spectrum"] {
-        let Bsdf::Diffuse(b) = bsdf(&format!("<bsdf type=\"diffuse\"><{element} name=\"reflectance\" value=\".25\"/></bsdf>")) else { panic!() };
+        let Bsdf::Diffuse(b) = bsdf(&format!("<bsdf type=\"diffuse\"><{element} name=\"reflectance\" value=\".25\"/></bsdf>")) else {
+            panic!()
+        };
         assert_colour(&b.reflectance, [0.25; 3]);
     }
 }
@@ -126,7 +130,8 @@ fn shapes_have_mitsubas_defaults() {
     let Geometry::Sphere(sphere) = geometry("<shape type=\"sphere\"/>") else { panic!() };
     assert_eq!((sphere.center(), sphere.radius()), (Vec3::ZERO, 1.0));
     assert!(matches!(geometry("<shape type=\"disk\"/>"), Geometry::Disk(_)));
-    let axis = "<point name=\"p0\" x=\"0\" y=\"0\" z=\"0\"/><point name=\"p1\" x=\"0\" y=\"0\" z=\"1\"/><float name=\"radius\" value=\"1\"/>";
+    let axis =
+        "<point name=\"p0\" x=\"0\" y=\"0\" z=\"0\"/><point name=\"p1\" x=\"0\" y=\"0\" z=\"1\"/><float name=\"radius\" value=\"1\"/>";
     let (plain, written) = (geometry("<shape type=\"cylinder\"/>"), geometry(&format!("<shape type=\"cylinder\">{axis}</shape>")));
     assert_eq!(format!("{plain:?}"), format!("{written:?}"));
 }
@@ -143,7 +148,8 @@ fn shapes_take_their_parameters() {
     let Geometry::Sphere(sphere) = geometry(sphere) else { panic!() };
     assert!(sphere.center().abs_diff_eq(Vec3::new(3.0, 1.0, 0.0), 1e-5) && close(sphere.radius(), 6.0));
     for kind in ["sphere", "disk", "cylinder"] {
-        let (plain, flipped) = (geometry(&format!("<shape type=\"{kind}\"/>")), geometry(&format!("<shape type=\"{kind}\">{flip}</shape>")));
+        let (plain, flipped) =
+            (geometry(&format!("<shape type=\"{kind}\"/>")), geometry(&format!("<shape type=\"{kind}\">{flip}</shape>")));
         assert_ne!(format!("{plain:?}"), format!("{flipped:?}"), "{kind}");
     }
 }
@@ -213,7 +219,8 @@ fn dielectric() {
 fn thindielectric() {
     let Bsdf::ThinDielectric(b) = bsdf("<bsdf type=\"thindielectric\"/>") else { panic!() };
     assert_close(b.eta, 1.5046 / 1.000277);
-    let Bsdf::ThinDielectric(b) = bsdf("<bsdf type=\"thindielectric\"><integer name=\"int_ior\" value=\"2\"/><string name=\"ext_ior\" value=\"vacuum\"/></bsdf>")
+    let Bsdf::ThinDielectric(b) =
+        bsdf("<bsdf type=\"thindielectric\"><integer name=\"int_ior\" value=\"2\"/><string name=\"ext_ior\" value=\"vacuum\"/></bsdf>")
     else {
         panic!()
     };
@@ -279,7 +286,8 @@ fn plastic() {
 #[test]
 fn roughplastic() {
     let distribution = |kind, alpha| Microfacet { kind, alpha_u: alpha, alpha_v: alpha, sampling: NormalSampling::Visible };
-    let expected = RoughPlastic::new(distribution(MicrofacetKind::Beckmann, 0.1), 1.49 / 1.000277, Texture::grey(0.5), Texture::grey(1.0), false);
+    let expected =
+        RoughPlastic::new(distribution(MicrofacetKind::Beckmann, 0.1), 1.49 / 1.000277, Texture::grey(0.5), Texture::grey(1.0), false);
     scatters_the_same(&bsdf("<bsdf type=\"roughplastic\"/>"), &Bsdf::RoughPlastic(Box::new(expected)));
     let set = "<bsdf type=\"roughplastic\"><string name=\"distribution\" value=\"ggx\"/><float name=\"alpha\" value=\".3\"/><float name=\"int_ior\" value=\"1.5\"/>\
                <float name=\"ext_ior\" value=\"1\"/><boolean name=\"nonlinear\" value=\"true\"/></bsdf>";
@@ -289,7 +297,11 @@ fn roughplastic() {
 
 #[test]
 fn blend_and_mask() {
-    let Bsdf::Blend(b) = bsdf("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\".25\"/><bsdf type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf>") else { panic!() };
+    let Bsdf::Blend(b) =
+        bsdf("<bsdf type=\"blendbsdf\"><float name=\"weight\" value=\".25\"/><bsdf type=\"diffuse\"/><bsdf type=\"conductor\"/></bsdf>")
+    else {
+        panic!()
+    };
     assert_colour(&b.weight, [0.25; 3]);
     assert!(matches!((&*b.first, &*b.second), (Bsdf::Diffuse(_), Bsdf::Conductor(_))));
     let Bsdf::Mask(b) = bsdf("<bsdf type=\"mask\"><bsdf type=\"diffuse\"/></bsdf>") else { panic!() };
@@ -318,7 +330,8 @@ fn very_small_alphas_are_raised_with_a_note() {
 
 #[test]
 fn references_share_materials() {
-    let loaded = load("<bsdf type=\"diffuse\" id=\"a\"/><shape type=\"sphere\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"a\"/></shape>");
+    let loaded =
+        load("<bsdf type=\"diffuse\" id=\"a\"/><shape type=\"sphere\"><ref id=\"a\"/></shape><shape type=\"cube\"><ref id=\"a\"/></shape>");
     assert_eq!(loaded.parts.bsdfs.len(), 1);
     // A reference may come before what it names.
     let loaded = load("<shape type=\"cube\"><ref id=\"a\"/></shape><bsdf type=\"conductor\" id=\"a\"/>");
@@ -357,9 +370,16 @@ fn emitter(xml: &str) -> Emitter {
 fn point() {
     let Emitter::Point(e) = emitter("<emitter type=\"point\"/>") else { panic!() };
     assert_eq!((e.position, e.intensity), (Vec3::ZERO, Rgb::WHITE));
-    let Emitter::Point(e) = emitter("<emitter type=\"point\"><point name=\"position\" value=\"1 2 3\"/><rgb name=\"intensity\" value=\"4 5 6\"/></emitter>") else { panic!() };
+    let Emitter::Point(e) =
+        emitter("<emitter type=\"point\"><point name=\"position\" value=\"1 2 3\"/><rgb name=\"intensity\" value=\"4 5 6\"/></emitter>")
+    else {
+        panic!()
+    };
     assert_eq!((e.position, e.intensity), (Vec3::new(1.0, 2.0, 3.0), Rgb::new(4.0, 5.0, 6.0)));
-    let Emitter::Point(e) = emitter("<emitter type=\"point\"><transform name=\"to_world\"><translate x=\"7\"/></transform></emitter>") else { panic!() };
+    let Emitter::Point(e) = emitter("<emitter type=\"point\"><transform name=\"to_world\"><translate x=\"7\"/></transform></emitter>")
+    else {
+        panic!()
+    };
     assert_eq!(e.position, Vec3::new(7.0, 0.0, 0.0));
 }
 
@@ -376,13 +396,17 @@ fn a_spectrum_on_an_emitter_is_the_equal_energy_spectrum() {
 
 #[test]
 fn spot() {
-    let written = "<float name=\"cutoff_angle\" value=\"20\"/><float name=\"beam_width\" value=\"15\"/><rgb name=\"intensity\" value=\"1\"/>";
+    let written =
+        "<float name=\"cutoff_angle\" value=\"20\"/><float name=\"beam_width\" value=\"15\"/><rgb name=\"intensity\" value=\"1\"/>";
     let (plain, set) = (emitter("<emitter type=\"spot\"/>"), emitter(&format!("<emitter type=\"spot\">{written}</emitter>")));
     assert_eq!(format!("{plain:?}"), format!("{set:?}"));
     let other = emitter("<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"40\"/></emitter>");
-    let beam = emitter("<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"40\"/><float name=\"beam_width\" value=\"30\"/></emitter>");
+    let beam =
+        emitter("<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"40\"/><float name=\"beam_width\" value=\"30\"/></emitter>");
     assert_eq!(format!("{other:?}"), format!("{beam:?}"), "the beam is three quarters of the cutoff");
-    let Emitter::Spot(e) = emitter("<emitter type=\"spot\"><transform name=\"to_world\"><translate z=\"3\"/></transform></emitter>") else { panic!() };
+    let Emitter::Spot(e) = emitter("<emitter type=\"spot\"><transform name=\"to_world\"><translate z=\"3\"/></transform></emitter>") else {
+        panic!()
+    };
     assert_eq!(e.position(), Vec3::new(0.0, 0.0, 3.0));
 }
 
@@ -390,7 +414,9 @@ fn spot() {
 fn directional_and_constant() {
     let Emitter::Directional(e) = emitter("<emitter type=\"directional\"/>") else { panic!() };
     assert_eq!(e.direction(), Vec3::Z);
-    let Emitter::Directional(e) = emitter("<emitter type=\"directional\"><vector name=\"direction\" value=\"0 -2 0\"/></emitter>") else { panic!() };
+    let Emitter::Directional(e) = emitter("<emitter type=\"directional\"><vector name=\"direction\" value=\"0 -2 0\"/></emitter>") else {
+        panic!()
+    };
     assert!(e.direction().abs_diff_eq(-Vec3::Y, 1e-6));
     let turned = "<emitter type=\"directional\"><transform name=\"to_world\"><rotate y=\"1\" angle=\"90\"/></transform></emitter>";
     let Emitter::Directional(e) = emitter(turned) else { panic!() };
@@ -422,7 +448,9 @@ fn perspective() {
     assert_eq!((d.field_of_view, d.near_clip, d.far_clip, d.lens), (FieldOfView::FocalLength(50.0), 0.01, 1e4, None));
     assert_eq!((loaded.film.width, loaded.film.height, loaded.film.crop), (768, 576, None));
     assert_eq!(loaded.defaults.sample_count, 4);
-    for (word, axis) in [("x", FovAxis::X), ("y", FovAxis::Y), ("diagonal", FovAxis::Diagonal), ("smaller", FovAxis::Smaller), ("larger", FovAxis::Larger)] {
+    for (word, axis) in
+        [("x", FovAxis::X), ("y", FovAxis::Y), ("diagonal", FovAxis::Diagonal), ("smaller", FovAxis::Smaller), ("larger", FovAxis::Larger)]
+    {
         let loaded = sensor("perspective", &format!("<float name=\"fov\" value=\"40\"/><string name=\"fov_axis\" value=\"{word}\"/>"));
         assert_eq!(loaded.parts.camera.description().field_of_view, FieldOfView::Angle { degrees: 40.0, axis });
     }
@@ -464,9 +492,16 @@ fn hdrfilm() {
 
 #[test]
 fn sampler_and_integrator() {
-    let loaded = sensor("perspective", "<sampler type=\"multijitter\"><integer name=\"sample_count\" value=\"99\"/><integer name=\"seed\" value=\"1\"/></sampler>");
+    let loaded = sensor(
+        "perspective",
+        "<sampler type=\"multijitter\"><integer name=\"sample_count\" value=\"99\"/><integer name=\"seed\" value=\"1\"/></sampler>",
+    );
     assert_eq!(loaded.defaults.sample_count, 99);
-    assert!(loaded.notes.iter().any(|n| n.message.contains("multijitter")) && loaded.notes.iter().any(|n| n.message.contains("seed")), "{:?}", loaded.notes);
+    assert!(
+        loaded.notes.iter().any(|n| n.message.contains("multijitter")) && loaded.notes.iter().any(|n| n.message.contains("seed")),
+        "{:?}",
+        loaded.notes
+    );
 
     let none = load("").defaults;
     assert_eq!((none.max_depth, none.rr_depth, none.hide_emitters, none.integrator), (None, 5, false, None));
@@ -477,6 +512,8 @@ fn sampler_and_integrator() {
     assert_eq!((d.max_depth, d.rr_depth, d.hide_emitters, d.integrator.as_deref()), (Some(7), 3, true, Some("volpath")));
     assert!(loaded.notes[0].message.contains("block_size"), "{:?}", loaded.notes);
     assert_eq!(load("<integrator type=\"path\"><integer name=\"max_depth\" value=\"-1\"/></integrator>").defaults.max_depth, None);
-    let nested = load("<integrator type=\"aov\"><string name=\"aovs\" value=\"dd:depth\"/><integrator type=\"path\"><integer name=\"max_depth\" value=\"4\"/></integrator></integrator>");
+    let nested = load(
+        "<integrator type=\"aov\"><string name=\"aovs\" value=\"dd:depth\"/><integrator type=\"path\"><integer name=\"max_depth\" value=\"4\"/></integrator></integrator>",
+    );
     assert_eq!((nested.defaults.max_depth, nested.defaults.integrator.as_deref()), (Some(4), Some("aov")));
 }

@@ -33,9 +33,10 @@ impl Builder<'_> {
         let bsdfs = plugin.children_of(Kind::Bsdf, &self.tree.plugins);
         let bsdf = match bsdfs[..] {
             [] => self.unnamed_bsdf(radiance.is_some()),
-            [child] => self
-                .bsdf_number(child.target)
-                .map_err(|e| if child.position == e.position { e } else { e.via("used at", &child.position) })?,
+            [child] => self.bsdf_number(child.target).map_err(|e| {
+                let written_here = child.position == self.plugin(child.target).position;
+                if written_here { e } else { e.via("used at", &child.position) }
+            })?,
             [_, second, ..] => {
                 return Err(SceneError::new(&second.position, format!("a second bsdf in the {}", plugin.title()))
                     .help("nest them in a blendbsdf or a twosided"));

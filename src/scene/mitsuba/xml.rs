@@ -590,9 +590,7 @@ fn syntax_error(path: &Path, text: &str, e: &roxmltree::Error) -> SceneError {
         roxmltree::Error::NodesLimitReached
         | roxmltree::Error::NoRootNode
         | roxmltree::Error::UnclosedRootNode
-        | roxmltree::Error::UnexpectedEndOfStream => {
-            Position::line(path, line_of(text.trim_end().len()))
-        }
+        | roxmltree::Error::UnexpectedEndOfStream => Position::line(path, line_of(text.trim_end().len())),
         _ => Position { file: Arc::from(path), line: Some(e.pos().row), column: Some(e.pos().col) },
     };
     // The parser's own message ends with the position, which stands in front already.
