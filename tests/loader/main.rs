@@ -3,6 +3,7 @@
 mod documentation;
 mod fuzz;
 mod gallery;
+mod gold;
 mod options;
 mod shared_scenes;
 mod values;
