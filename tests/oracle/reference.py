@@ -75,13 +75,16 @@ def content_hash(path):
 
 
 def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=False, width=None, height=None, variant="llvm_ad_rgb",
-           defines=(), integrator="path", keep=None):
+           defines=(), integrator="path", keep=None, threads=1):
+    import drjit as dr
     import mitsuba as mi
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     folder = os.path.dirname(os.path.abspath(path))
     mi.file_resolver().prepend(folder)
+    dr.set_thread_count(max(2, threads))  # an environment map never finishes loading on one thread
     scene = mi.load_string(prepared(path, width, height), **dict(d.split("=", 1) for d in defines))
+    dr.set_thread_count(threads)
     if max_depth is None:
         inside = scene.integrator()
     else:
@@ -90,6 +93,8 @@ def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=Fa
     w, h = (int(x) for x in film.crop_size())
     per = spp if variant.startswith("scalar") else max(1, min(spp, WAVEFRONT // (w * h)))
     parts = [per] * (spp // per) + ([spp % per] if spp % per else [])
+    if keep:
+        os.makedirs(os.path.dirname(os.path.abspath(keep)), exist_ok=True)
     images, bad, cpu, wall = [], 0, time.process_time(), time.perf_counter()
     for i in range(runs):
         total = np.zeros((h, w, 3))
@@ -105,7 +110,6 @@ def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=Fa
             exr.write(f"{keep}.{i:02d}.exr", image)
     images = np.stack(images)
     mean, var = images.mean(0), images.var(0, ddof=1) / runs
-    n = w * h
     run_means = images.mean((1, 2))
     tile = 16
     rows, cols = range(0, h, tile), range(0, w, tile)
@@ -121,7 +125,6 @@ def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=Fa
             "mean_stderr": [float(f"{x:.3g}") for x in run_means.std(0, ddof=1) / np.sqrt(runs)],
             "tile_relative_stderr": {"largest": float(f"{max(rel, default=0):.3g}"), "median": float(f"{np.median(rel or [0]):.3g}")},
             "cpu_seconds": round(time.process_time() - cpu, 1), "seconds": round(time.perf_counter() - wall, 1)}
-    assert info["width"] * info["height"] == n
     return mean, var, info
 
 
@@ -160,15 +163,21 @@ def main():
     p.add_argument("--variant", default="llvm_ad_rgb")
     p.add_argument("--threads", type=int, default=1)
     p.add_argument("-D", dest="defines", action="append", default=[], metavar="NAME=VALUE")
+    p.add_argument("--exact", type=float, metavar="VALUE", help="no rendering: the image is known to be VALUE everywhere (variance 0)")
     p.add_argument("--keep-runs", action="store_true", help="also NAME.00.exr, NAME.01.exr, ...")
     a = p.parse_args()
     if bool(a.scene) == bool(a.manifest) or bool(a.scene) != bool(a.out) or a.runs < 2:
         p.error("give SCENE and -o NAME, or --manifest; at least two runs")
-    import drjit as dr
-    dr.set_thread_count(a.threads)
+    if a.scene and a.exact is not None:
+        if not (a.width and a.height):
+            p.error("--exact needs --width and --height")
+        shape = (a.height, a.width, 3)
+        save(a.out, np.full(shape, a.exact), np.zeros(shape), {"sha256": content_hash(a.scene), "exact": a.exact, "width": a.width,
+                                                              "height": a.height, "runs": a.runs, "mean": [a.exact] * 3, "mean_stderr": [0.0] * 3})
+        return
     if a.scene:
         mean, var, info = render(a.scene, a.runs, a.spp, a.seed, a.max_depth, a.rr_depth, a.hide_emitters, a.width, a.height, a.variant,
-                                 a.defines, a.integrator, a.out if a.keep_runs else None)
+                                 a.defines, a.integrator, a.out if a.keep_runs else None, a.threads)
         save(a.out, mean, var, info)
         report(os.path.basename(a.out), info)
         return
@@ -185,7 +194,7 @@ def main():
                 old = json.load(f)
             if all(old[k] == e[k] for k in ("runs", "spp", "seed")) and old["sha256"] == content_hash(scene):
                 continue
-        mean, var, info = render(scene, e["runs"], e["spp"], e["seed"], variant=a.variant, defines=e.get("defines", []))
+        mean, var, info = render(scene, e["runs"], e["spp"], e["seed"], variant=a.variant, defines=e.get("defines", []), threads=a.threads)
         save(name, mean, var, info)
         report(e["name"], info)
 

@@ -29,7 +29,7 @@ const FRAC_1_SQRT_PI: f32 = 0.564_189_6;
 #[inline(always)]
 fn scaled_erfc(x: f32) -> f32 {
     let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))))
+    t * (0.254_829_6 + t * (-0.284_496_74 + t * (1.421_413_7 + t * (-1.453_152 + t * 1.061_405_4))))
 }
 
 /// Inverse error function in (-1, 1), to about 1e-6 relative ([GILES10], single precision).
@@ -39,7 +39,7 @@ fn erf_inv(x: f32) -> f32 {
         2.810_226_4e-8,
         3.432_739_4e-7,
         -3.523_387_7e-6,
-        -4.391_506_5e-6,
+        -4.391_506_7e-6,
         2.185_808_7e-4,
         -1.253_725e-3,
         -4.177_681_6e-3,
@@ -54,7 +54,7 @@ fn erf_inv(x: f32) -> f32 {
         5.739_507_7e-3,
         -7.622_461_3e-3,
         9.438_870_5e-3,
-        1.001_674_1,
+        1.001_674,
         2.832_976_8,
     ];
     let w = -((1.0 - x) * (1.0 + x)).ln();
@@ -106,7 +106,8 @@ pub(super) fn visible_slope(cos: f32, sin: f32, u: f32) -> f32 {
         let step = (next - b).abs();
         b = f32::clamp(next, -1.0 + 2.0 * HALF_STEP, 1.0 - 2.0 * HALF_STEP);
         x = erf_inv(b);
-        if step < 1e-6 * (1.0 + b) + 1e-7 {
+        // The error is the square of the step's, relative to the distance from the ends.
+        if step < 1e-4 * (1.0 + b) {
             break;
         }
     }

@@ -29,9 +29,16 @@ pub fn dielectric(cos: f32, eta: f32) -> Interface {
         return Interface { reflectance: 1.0, cos_transmitted: 0.0, eta };
     }
     let cos_t = cos2_t.sqrt();
-    let r_s = (c - eta * cos_t) / (c + eta * cos_t);
-    let r_p = (cos_t - eta * c) / (cos_t + eta * c);
-    Interface { reflectance: (0.5 * (r_s * r_s + r_p * r_p)).min(1.0), cos_transmitted: cos_t.copysign(-cos), eta }
+    Interface { reflectance: reflectance(c, cos_t, eta), cos_transmitted: cos_t.copysign(-cos), eta }
+}
+
+/// Share of light reflected where both cosines with the normal are known, each positive, and `eta` is the index on the far side over
+/// that on the near side.
+#[inline(always)]
+pub fn reflectance(cos: f32, cos_transmitted: f32, eta: f32) -> f32 {
+    let r_s = (cos - eta * cos_transmitted) / (cos + eta * cos_transmitted);
+    let r_p = (cos_transmitted - eta * cos) / (cos_transmitted + eta * cos);
+    (0.5 * (r_s * r_s + r_p * r_p)).min(1.0)
 }
 
 /// Fresnel's equations for a metal of complex relative index `eta + i k`, at cosine `cos` in [0, 1] ([LAZANYI05], exact form).

@@ -21,7 +21,8 @@ impl Mask {
         let opacity = self.opacity.eval_1(uv).clamp(0.0, 1.0);
         let probability = match lobes {
             Lobes::All => opacity,
-            Lobes::Rough(_) => 1.0,
+            // Where there is nothing, there is nothing to sample.
+            Lobes::Rough(_) => f32::from(u8::from(opacity > 0.0)),
             Lobes::Smooth(_) if self.nested.admitted_by(lobes) => opacity,
             Lobes::Smooth(_) => 0.0,
         };
@@ -53,6 +54,9 @@ impl Mask {
             s.pdf_fwd *= p;
             s.pdf_rev *= p;
             return s.if_not_black();
+        }
+        if !lobes.admit(0.0) {
+            return None;
         }
         let weight = Rgb::splat((1.0 - opacity) / (1.0 - p));
         BsdfSample { w: -given, weight, pdf_fwd: 1.0 - p, pdf_rev: 1.0 - p, delta: true, roughness: 0.0, eta: 1.0 }.if_not_black()

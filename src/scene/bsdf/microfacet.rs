@@ -41,6 +41,9 @@ pub struct Microfacet {
 /// The smoothest surface that 32-bit arithmetic bears; Mitsuba raises smaller values to it.
 pub const MIN_ALPHA: f32 = 1e-4;
 
+/// Below this cosine a facet counts as seen edge on: densities per steradian, up to `1/(pi MIN_ALPHA^2 EDGE_ON)`, stay finite.
+pub(super) const EDGE_ON: f32 = 1e-20;
+
 impl Microfacet {
     /// Roughness as [`super::Lobes`] counts it.
     #[inline(always)]
@@ -118,8 +121,8 @@ impl Microfacet {
     pub fn reflection_pdf(&self, w: Vec3, h: Vec3, cos_h: f32, d: f32) -> f32 {
         match self.sampling {
             NormalSampling::Visible => 0.25 * d * self.exact_g1_over_cos(w),
-            // A facet seen from its back reflects nothing.
-            NormalSampling::All if cos_h > 0.0 => 0.25 * d * h.z / cos_h,
+            // A facet seen from its back reflects nothing, and one seen edge on would have a density beyond what numbers hold.
+            NormalSampling::All if cos_h > EDGE_ON => 0.25 * d * h.z / cos_h,
             NormalSampling::All => 0.0,
         }
     }

@@ -202,3 +202,6 @@ pub mod roughplastic;
 pub mod thindielectric;
 mod transmittance;
 pub mod twosided;
+
+#[cfg(test)]
+mod tests;

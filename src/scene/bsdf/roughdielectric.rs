@@ -1,6 +1,6 @@
 //! Glass with a microfacet surface.
 
-use super::microfacet::{Microfacet, NormalSampling, reflect};
+use super::microfacet::{EDGE_ON, Microfacet, NormalSampling, reflect};
 use super::{BsdfSample, Lobes, Mode, fresnel};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
@@ -67,12 +67,17 @@ impl RoughDielectric {
     #[inline(always)]
     fn checked(&self, given: Vec3, sampled: Vec3, h: Vec3, eta: f32) -> Option<Facet> {
         let (given_h, sampled_h) = (given.dot(h), sampled.dot(h));
-        if given_h * given.z <= 0.0 || sampled_h * sampled.z <= 0.0 {
+        if given_h * given.z.signum() <= EDGE_ON || sampled_h * sampled.z.signum() <= EDGE_ON {
             return None;
         }
         let d = self.distribution.d(h);
         let reflection = given.z * sampled.z > 0.0;
-        let reflectance = fresnel::dielectric(given_h, self.eta).reflectance;
+        let reflectance = if reflection {
+            fresnel::dielectric(given_h, self.eta).reflectance
+        } else {
+            // Both cosines are known: near the critical angle one has no digits left to give the other.
+            fresnel::reflectance(given_h.abs(), sampled_h.abs(), eta)
+        };
         (d > 0.0).then_some(Facet { given, sampled, h, given_h, sampled_h, d, reflection, eta, reflectance })
     }
 

@@ -1,7 +1,7 @@
 //! How much light a rough dielectric boundary lets through.
 
-use super::fresnel;
 use super::microfacet::{Microfacet, MicrofacetKind, NormalSampling, reflect};
+use super::{beckmann, fresnel};
 use crate::math::warp;
 use glam::{Vec2, Vec3};
 
@@ -60,12 +60,19 @@ enum Through {
 /// kept because its error is part of the material's definition; the tables then agree to 1e-5.
 fn share(distribution: &Microfacet, nodes: &[(f32, f32)], cos: f32, eta: f32, through: Through) -> f32 {
     let w = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
+    let alpha = distribution.alpha_u;
+    let stretched = Vec3::new(alpha * w.x, 0.0, w.z).normalize();
     let mut sum = 0.0f64;
-    for &(x, weight_x) in nodes {
-        for &(y, weight_y) in nodes {
+    for &(along, weight_along) in nodes {
+        let slope = match distribution.kind {
+            MicrofacetKind::Beckmann => beckmann::visible_slope(stretched.z, stretched.x, along),
+            MicrofacetKind::Ggx => 0.0,
+        };
+        // The other coordinate is symmetric: half of it counts twice.
+        for &(across, weight_across) in nodes.iter().filter(|n| n.0 < 0.5) {
             let h = match distribution.kind {
-                MicrofacetKind::Beckmann => distribution.sample(w, Vec2::new(x, y)),
-                MicrofacetKind::Ggx => projected_ggx_normal(distribution.alpha_u, w, Vec2::new(x, y)),
+                MicrofacetKind::Beckmann => Vec3::new(-slope * alpha, beckmann::gaussian_slope(across) * alpha, 1.0).normalize(),
+                MicrofacetKind::Ggx => projected_ggx_normal(alpha, stretched, Vec2::new(across, along)),
             };
             let interface = fresnel::dielectric(w.dot(h), eta);
             let (other, share) = match through {
@@ -73,7 +80,7 @@ fn share(distribution: &Microfacet, nodes: &[(f32, f32)], cos: f32, eta: f32, th
                 Through::Transmitted => (-fresnel::refract(w, h, &interface), 1.0 - interface.reflectance),
             };
             if other.z > 0.0 && share > 0.0 {
-                sum += f64::from(weight_x * weight_y * share * distribution.g1_over_cos(other) * other.z);
+                sum += f64::from(2.0 * weight_along * weight_across * share * distribution.g1_over_cos(other) * other.z);
             }
         }
     }
@@ -81,9 +88,8 @@ fn share(distribution: &Microfacet, nodes: &[(f32, f32)], cos: f32, eta: f32, th
 }
 
 /// A visible normal by the projected area of the stretched hemisphere ([HEITZ18]): the map whose quadrature Mitsuba uses, not the one
-/// that directions are sampled with. `w` lies in the xz plane.
+/// that directions are sampled with. `w`, stretched, lies in the xz plane.
 fn projected_ggx_normal(alpha: f32, w: Vec3, u: Vec2) -> Vec3 {
-    let w = Vec3::new(alpha * w.x, 0.0, w.z).normalize();
     let p = warp::disk(u);
     let s = 0.5 * (1.0 + w.z);
     let y = (1.0 - s) * (1.0 - p.x * p.x).max(0.0).sqrt() + s * p.y;
