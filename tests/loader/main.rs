@@ -4,6 +4,7 @@ mod documentation;
 mod fuzz;
 mod gallery;
 mod gold;
+mod lights_and_sensors;
 mod options;
 mod shared_scenes;
 mod values;

@@ -143,6 +143,19 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// Makes a `T` of a plugin.
+pub(super) type Constructor<T> = fn(&mut Builder<'_>, &Plugin) -> Result<T>;
+
+/// The plugins of a kind: what `type` names them, and how each is made.
+pub(super) type Table<T> = &'static [(&'static str, Constructor<T>)];
+
+/// How a plugin is made; an error with the names of the table if it is not in it.
+pub(super) fn constructor<T>(table: Table<T>, plugin: &Plugin) -> Result<Constructor<T>> {
+    let found = table.iter().find(|(name, _)| *name == plugin.type_name);
+    let names = || table.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+    found.map(|(_, construct)| *construct).ok_or_else(|| unsupported(plugin, &names()))
+}
+
 /// The error for a type that is not in a kind's table.
 pub(super) fn unsupported(plugin: &Plugin, names: &[&str]) -> SceneError {
     let message = format!("the {} type \"{}\" is not supported", plugin.kind.element(), excerpt(&plugin.type_name));

@@ -6,6 +6,7 @@
 
 mod bsdfs;
 mod build;
+mod element;
 mod emitters;
 mod error;
 mod files;

@@ -1,6 +1,6 @@
 //! Shapes.
 
-use super::build::{Builder, to_world, unsupported};
+use super::build::{Builder, Table, constructor, to_world};
 use super::error::{Result, SceneError};
 use super::files::resolve;
 use super::plugin::{Kind, Plugin};
@@ -10,7 +10,7 @@ use crate::scene::shape::{Cylinder, Disk, Geometry, Mesh, Shape, ShapeError, Sph
 use glam::Vec3;
 
 /// Every shape. Adding one is its constructor and one line here.
-pub(super) const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Geometry>)] =
+pub(super) const TABLE: Table<Geometry> =
     &[("obj", obj), ("rectangle", rectangle), ("cube", cube), ("sphere", sphere), ("disk", disk), ("cylinder", cylinder)];
 
 const NOTED: &[(&str, &str)] = &[("silhouette_sampling_weight", "it matters to differentiable rendering only")];
@@ -21,9 +21,7 @@ const NOTED_FLAT: &[(&str, &str)] = &[NOTED[0], ("face_normals", "a rectangle is
 impl Builder<'_> {
     /// A shape of the scene with its material and, if it shines, its radiance.
     pub(super) fn shape(&mut self, plugin: &Plugin) -> Result<()> {
-        let Some((_, construct)) = TABLE.iter().find(|(name, _)| *name == plugin.type_name) else {
-            return Err(unsupported(plugin, &TABLE.iter().map(|(name, _)| *name).collect::<Vec<_>>()));
-        };
+        let construct = constructor(TABLE, plugin)?;
         // Emitters are looked at first: a shape's default material depends on whether it shines.
         let emitters = plugin.children_of(Kind::Emitter, &self.tree.plugins);
         if let [_, second, ..] = emitters[..] {
