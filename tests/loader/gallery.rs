@@ -1,7 +1,7 @@
 //! Malformed inputs: each gives an error that names the file and, for XML and OBJ, the line; none panics, none takes long.
 
 use super::here;
-use isophote::scene::mitsuba::{LoadOptions, SceneError, load_parts};
+use isophote::scene::mitsuba::{LoadOptions, SceneError, load as load_scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -29,12 +29,12 @@ fn cases() -> Vec<Case> {
 /// Loads a file of the gallery: a scene by itself, an OBJ file or an image through a scene that names it.
 fn load(file: &str) -> Result<(), SceneError> {
     let through = match file.split_once('/') {
-        Some(("xml", _)) => return load_parts(&here("bad").join(file), &LoadOptions::default()).map(drop),
+        Some(("xml", _)) => return load_scene(&here("bad").join(file), &LoadOptions::default()).map(drop),
         Some(("obj", _)) => "bad/obj.xml",
         _ => "bad/image.xml",
     };
     let options = LoadOptions { defines: vec![("file".to_owned(), file.to_owned())], ..LoadOptions::default() };
-    load_parts(&here(through), &options).map(drop)
+    load_scene(&here(through), &options).map(drop)
 }
 
 fn check(case: &Case) -> Result<(), String> {

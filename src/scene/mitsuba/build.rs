@@ -35,6 +35,8 @@ pub(super) struct Builder<'a> {
     /// Images already read; the flag is `raw`.
     pub(super) texels: HashMap<(PathBuf, bool), Arc<Texels>>,
     pub(super) shapes: Vec<Shape>,
+    /// Where each shape is written, by name.
+    pub(super) shape_positions: Vec<(String, Position)>,
     pub(super) emitters: Vec<Emitter>,
     /// The emitter around the scene, if one was built.
     pub(super) environment: Option<Position>,
@@ -53,6 +55,7 @@ impl<'a> Builder<'a> {
             built_bsdfs: HashMap::new(),
             texels: HashMap::new(),
             shapes: Vec::new(),
+            shape_positions: Vec::new(),
             emitters: Vec::new(),
             environment: None,
             unnamed: [None; 2],

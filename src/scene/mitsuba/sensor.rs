@@ -176,11 +176,11 @@ fn film_size(at: &Position, size: [u32; 2], crop: Option<[u32; 4]>, options: &Lo
             .help(format!("between 1 and {MOST_PIXELS} pixels are supported")));
     }
     let crop = options.crop.or(crop);
-    if let Some([x, y, w, h]) = crop {
-        if !(fits(x, w, width) && fits(y, h, height)) {
-            return Err(SceneError::new(at, format!("a crop window of {w} x {h} at ({x}, {y}) on a film of {width} x {height}"))
-                .help("the window must lie on the film and hold at least one pixel"));
-        }
+    if let Some([x, y, w, h]) = crop
+        && !(fits(x, w, width) && fits(y, h, height))
+    {
+        let message = format!("a crop window of {w} x {h} at ({x}, {y}) on a film of {width} x {height}");
+        return Err(SceneError::new(at, message).help("the window must lie on the film and hold at least one pixel"));
     }
     Ok(FilmSize { width, height, crop })
 }

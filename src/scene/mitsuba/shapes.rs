@@ -44,6 +44,7 @@ impl Builder<'_> {
         let flat = plugin.type_name == "rectangle";
         self.finish(plugin, if flat { NOTED_FLAT } else { NOTED })?;
         let name = plugin.id.clone().unwrap_or_else(|| format!("{} {}", plugin.type_name, self.shapes.len()));
+        self.shape_positions.push((name.clone(), plugin.position.clone()));
         self.shapes.push(Shape { name, geometry, bsdf, radiance });
         Ok(())
     }

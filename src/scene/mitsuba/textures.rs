@@ -25,7 +25,7 @@ pub(super) enum Role {
 }
 
 /// Linear Rec. 709 components of Mitsuba's `<spectrum value="1"/>` on an emitter: the equal-energy spectrum, not white (measured with 3.9.1).
-const EQUAL_ENERGY: [f64; 3] = [1.204_79, 0.948_291, 0.908_916];
+const EQUAL_ENERGY: [f64; 3] = [1.204_794, 0.948_291, 0.908_916];
 
 impl Role {
     fn holds(self, v: f32) -> bool {
