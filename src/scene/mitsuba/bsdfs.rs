@@ -1,6 +1,6 @@
 //! Materials.
 
-use super::build::{Builder, unsupported};
+use super::build::{Builder, Table, constructor};
 use super::error::{Result, SceneError, excerpt, suggest};
 use super::plugin::{Given, Kind, Plugin, PluginId, Value};
 use super::textures::Role;
@@ -14,7 +14,7 @@ use crate::scene::bsdf::{thindielectric, twosided};
 use crate::scene::texture::Texture;
 
 /// Every material. Adding one is its constructor and one line here.
-pub(super) const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Bsdf>)] = &[
+pub(super) const TABLE: Table<Bsdf> = &[
     ("diffuse", diffuse),
     ("twosided", twosided),
     ("dielectric", dielectric),
@@ -39,9 +39,7 @@ impl Builder<'_> {
             return Ok(built.clone());
         }
         let plugin = self.plugin(id);
-        let Some((_, construct)) = TABLE.iter().find(|(name, _)| *name == plugin.type_name) else {
-            return Err(unsupported(plugin, &TABLE.iter().map(|(name, _)| *name).collect::<Vec<_>>()));
-        };
+        let construct = constructor(TABLE, plugin)?;
         let bsdf = construct(self, plugin)?;
         self.finish(plugin, &[])?;
         if nested_count(&bsdf) > MOST_NESTED {

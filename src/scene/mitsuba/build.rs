@@ -35,6 +35,8 @@ pub(super) struct Builder<'a> {
     /// Images already read; the flag is `raw`.
     pub(super) texels: HashMap<(PathBuf, bool), Arc<Texels>>,
     pub(super) shapes: Vec<Shape>,
+    /// Where each shape is written, by name.
+    pub(super) shape_positions: Vec<(String, Position)>,
     pub(super) emitters: Vec<Emitter>,
     /// The emitter around the scene, if one was built.
     pub(super) environment: Option<Position>,
@@ -53,6 +55,7 @@ impl<'a> Builder<'a> {
             built_bsdfs: HashMap::new(),
             texels: HashMap::new(),
             shapes: Vec::new(),
+            shape_positions: Vec::new(),
             emitters: Vec::new(),
             environment: None,
             unnamed: [None; 2],
@@ -141,6 +144,19 @@ impl<'a> Builder<'a> {
         }
         Ok(found.first().copied())
     }
+}
+
+/// Makes a `T` of a plugin.
+pub(super) type Constructor<T> = fn(&mut Builder<'_>, &Plugin) -> Result<T>;
+
+/// The plugins of a kind: what `type` names them, and how each is made.
+pub(super) type Table<T> = &'static [(&'static str, Constructor<T>)];
+
+/// How a plugin is made; an error with the names of the table if it is not in it.
+pub(super) fn constructor<T>(table: Table<T>, plugin: &Plugin) -> Result<Constructor<T>> {
+    let found = table.iter().find(|(name, _)| *name == plugin.type_name);
+    let names = || table.iter().map(|(name, _)| *name).collect::<Vec<_>>();
+    found.map(|(_, construct)| *construct).ok_or_else(|| unsupported(plugin, &names()))
 }
 
 /// The error for a type that is not in a kind's table.

@@ -1,6 +1,6 @@
 //! Emitters that are no shapes, and the radiance of shapes that shine.
 
-use super::build::{Builder, to_world, unsupported};
+use super::build::{Builder, Table, to_world, unsupported};
 use super::error::{Result, SceneError};
 use super::plugin::{Plugin, PluginId};
 use super::textures::Role;
@@ -10,8 +10,7 @@ use crate::scene::texture::{Bitmap, Decoding, Filter, Texture, Wrap};
 use glam::{Affine2, DVec3, Vec2, Vec3};
 
 /// Emitters that stand in the scene. Adding one is its constructor and one line here, and one in [`NAMES`].
-const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Emitter>)] =
-    &[("point", point), ("spot", spot), ("directional", directional), ("constant", constant), ("envmap", envmap)];
+const TABLE: Table<Emitter> = &[("point", point), ("spot", spot), ("directional", directional), ("constant", constant), ("envmap", envmap)];
 
 /// Every emitter; `area` stands in a shape.
 pub(super) const NAMES: &[&str] = &["area", "point", "spot", "directional", "constant", "envmap"];
@@ -29,11 +28,11 @@ impl Builder<'_> {
         let Some((_, construct)) = TABLE.iter().find(|(name, _)| *name == plugin.type_name) else { return Err(unsupported(plugin, NAMES)) };
         let emitter = construct(self, plugin)?;
         self.finish(plugin, NOTED)?;
-        if matches!(emitter, Emitter::Constant(_) | Emitter::Envmap(_)) {
-            if let Some(first) = self.environment.replace(plugin.position.clone()) {
-                let error = SceneError::new(&plugin.position, "a second emitter around the scene");
-                return Err(error.help(format!("keep one constant or envmap; the first is at {first}")));
-            }
+        if matches!(emitter, Emitter::Constant(_) | Emitter::Envmap(_))
+            && let Some(first) = self.environment.replace(plugin.position.clone())
+        {
+            let error = SceneError::new(&plugin.position, "a second emitter around the scene");
+            return Err(error.help(format!("keep one constant or envmap; the first is at {first}")));
         }
         self.emitters.push(emitter);
         Ok(())

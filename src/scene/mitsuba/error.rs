@@ -111,23 +111,26 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     }
 }
 
-/// Levenshtein distance of two short words.
+/// Letters to insert, drop, replace or swap with their neighbour ([DAMERAU64], restricted: no letter takes part twice).
 fn edit_distance(a: &str, b: &str) -> usize {
     // Names longer than this are no slip of the hand, and the cost is quadratic.
     const LONGEST: usize = 64;
     let a: Vec<char> = a.chars().take(LONGEST).collect();
     let b: Vec<char> = b.chars().take(LONGEST).collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let substitute = diagonal + usize::from(ca != cb);
-            diagonal = row[j + 1];
-            row[j + 1] = substitute.min(row[j] + 1).min(diagonal + 1);
+    let mut before: Vec<usize> = Vec::new();
+    let mut above: Vec<usize> = (0..=b.len()).collect();
+    for i in 0..a.len() {
+        let mut row = vec![i + 1];
+        for j in 0..b.len() {
+            let mut cost = (above[j] + usize::from(a[i] != b[j])).min(above[j + 1] + 1).min(row[j] + 1);
+            if i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j] {
+                cost = cost.min(before[j - 1] + 1);
+            }
+            row.push(cost);
         }
+        before = std::mem::replace(&mut above, row);
     }
-    row[b.len()]
+    above[b.len()]
 }
 
 /// A word from a file, cut to a length that a terminal bears.
@@ -145,7 +148,7 @@ mod tests {
         let known = ["reflectance", "alpha", "eta"];
         assert!(suggest("reflectence", &known).starts_with("did you mean \"reflectance\"?"));
         assert!(suggest("roughness", &known).starts_with("supported: alpha, eta, reflectance"));
-        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!((edit_distance("kitten", "sitting"), edit_distance("shpae", "shape"), edit_distance("", "ab")), (3, 1, 2));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 mod bsdfs;
 mod build;
+mod element;
 mod emitters;
 mod error;
 mod files;
@@ -17,7 +18,7 @@ mod textures;
 mod transform;
 mod xml;
 
-pub(in crate::scene) use error::Result;
+use error::Result;
 pub use error::{Position, SceneError};
 
 use super::{Scene, SceneParts};
@@ -102,6 +103,8 @@ pub struct LoadedParts {
     /// SHA-256 over the SHA-256 of each of [`LoadedParts::files`], in their order; lower-case hexadecimal. Names, `-D`, resolution and
     /// crop are not in it.
     pub content_hash: String,
+    /// Where each shape is written, by the name it has in the parts.
+    shape_positions: Vec<(String, Position)>,
 }
 
 /// A scene ready to be rendered.
@@ -122,8 +125,14 @@ pub struct LoadedScene {
 
 /// Reads a scene and everything it names, and builds it.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<LoadedScene> {
-    let LoadedParts { parts, film, defaults, notes, files, content_hash } = load_parts(path, options)?;
-    let scene = Scene::build(parts).map_err(|e| SceneError::new(&Position::whole(path), e.to_string()))?;
+    let LoadedParts { parts, film, defaults, notes, files, content_hash, shape_positions } = load_parts(path, options)?;
+    let scene = Scene::build(parts).map_err(|e| {
+        let at = match &e {
+            super::SceneError::Shape { name, .. } => shape_positions.iter().find(|(shape, _)| shape == name).map(|(_, at)| at.clone()),
+            _ => None,
+        };
+        SceneError::new(&at.unwrap_or_else(|| Position::whole(path)), e.to_string())
+    })?;
     Ok(LoadedScene { scene, film, defaults, notes, files, content_hash })
 }
 
@@ -133,10 +142,11 @@ pub fn load_parts(path: &Path, options: &LoadOptions) -> Result<LoadedParts> {
     let tree = xml::read(path, &options.defines, &mut files)?;
     let mut builder = build::Builder::new(&tree, &mut files);
     let built = builder.scene(options)?;
+    let shape_positions = std::mem::take(&mut builder.shape_positions);
     let mut notes = builder.into_notes();
     notes.splice(0..0, tree.notes.iter().cloned());
     let (files, content_hash) = files.finish();
-    Ok(LoadedParts { parts: built.parts, film: built.film, defaults: built.defaults, notes, files, content_hash })
+    Ok(LoadedParts { parts: built.parts, film: built.film, defaults: built.defaults, notes, files, content_hash, shape_positions })
 }
 
 /// Every plugin the loader knows with the parameters it takes, as `(kind, type)`; what `docs/scenes.md` has to list.

@@ -323,11 +323,6 @@ impl Plugin {
         let message = format!("a {} has no parameter \"{}\" here", self.title(), super::error::excerpt(name));
         SceneError::new(position, message).help(suggest(name, &known))
     }
-
-    /// Names asked for so far.
-    pub(super) fn asked(&self) -> Vec<&'static str> {
-        self.asked.borrow().clone()
-    }
 }
 
 impl Property {

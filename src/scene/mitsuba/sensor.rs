@@ -72,16 +72,14 @@ impl Builder<'_> {
             pixels(plugin, "crop_height", size[1])?,
         ];
         let crop = (window != [0, 0, size[0], size[1]]).then_some(window);
-        if let Some([x, y, width, height]) = crop {
-            if u64::from(x) + u64::from(width) > u64::from(size[0]) || u64::from(y) + u64::from(height) > u64::from(size[1]) {
-                let name = ["crop_width", "crop_height", "crop_offset_x", "crop_offset_y"]
-                    .into_iter()
-                    .find(|name| plugin.has(name))
-                    .unwrap_or("width");
-                let message = format!("the crop window, {width} x {height} at ({x}, {y}), leaves the film of {} x {}", size[0], size[1]);
-                return Err(SceneError::new(plugin.place(name), message)
-                    .help("crop_width and crop_height default to the film's size, whatever the offset"));
-            }
+        if let Some([x, y, width, height]) = crop
+            && !(fits(x, width, size[0]) && fits(y, height, size[1]))
+        {
+            let names = ["crop_width", "crop_height", "crop_offset_x", "crop_offset_y"];
+            let name = names.into_iter().find(|name| plugin.has(name)).unwrap_or("width");
+            let message = format!("the crop window, {width} x {height} at ({x}, {y}), leaves the film of {} x {}", size[0], size[1]);
+            let help = "crop_width and crop_height default to the film's size, whatever the offset";
+            return Err(SceneError::new(plugin.place(name), message).help(help));
         }
         match self.only(plugin, Kind::Rfilter)? {
             Some(filter) if self.plugin(filter.target).type_name == "box" => {}
@@ -161,6 +159,11 @@ fn pixels(plugin: &Plugin, name: &'static str, default: u32) -> Result<u32> {
     Ok(given.check(name, |n| (1..=i64::from(u32::MAX)).contains(n), "a number of pixels, at least 1")?.value as u32)
 }
 
+/// Does a window lie on the film, along one axis, and hold a pixel?
+fn fits(offset: u32, size: u32, whole: u32) -> bool {
+    size > 0 && u64::from(offset) + u64::from(size) <= u64::from(whole)
+}
+
 /// The film's size and window after the options; a window of the scene's does not carry over to another resolution.
 fn film_size(at: &Position, size: [u32; 2], crop: Option<[u32; 4]>, options: &LoadOptions) -> Result<FilmSize> {
     let [width, height] = options.resolution.map_or(size, |(width, height)| [width, height]);
@@ -173,12 +176,11 @@ fn film_size(at: &Position, size: [u32; 2], crop: Option<[u32; 4]>, options: &Lo
             .help(format!("between 1 and {MOST_PIXELS} pixels are supported")));
     }
     let crop = options.crop.or(crop);
-    if let Some([x, y, w, h]) = crop {
-        let fits = |offset: u32, size: u32, whole: u32| size > 0 && u64::from(offset) + u64::from(size) <= u64::from(whole);
-        if !(fits(x, w, width) && fits(y, h, height)) {
-            return Err(SceneError::new(at, format!("a crop window of {w} x {h} at ({x}, {y}) on a film of {width} x {height}"))
-                .help("the window must lie on the film and hold at least one pixel"));
-        }
+    if let Some([x, y, w, h]) = crop
+        && !(fits(x, w, width) && fits(y, h, height))
+    {
+        let message = format!("a crop window of {w} x {h} at ({x}, {y}) on a film of {width} x {height}");
+        return Err(SceneError::new(at, message).help("the window must lie on the film and hold at least one pixel"));
     }
     Ok(FilmSize { width, height, crop })
 }

@@ -1,6 +1,6 @@
 //! Shapes.
 
-use super::build::{Builder, to_world, unsupported};
+use super::build::{Builder, Table, constructor, to_world};
 use super::error::{Result, SceneError};
 use super::files::resolve;
 use super::plugin::{Kind, Plugin};
@@ -10,17 +10,18 @@ use crate::scene::shape::{Cylinder, Disk, Geometry, Mesh, Shape, ShapeError, Sph
 use glam::Vec3;
 
 /// Every shape. Adding one is its constructor and one line here.
-pub(super) const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Geometry>)] =
+pub(super) const TABLE: Table<Geometry> =
     &[("obj", obj), ("rectangle", rectangle), ("cube", cube), ("sphere", sphere), ("disk", disk), ("cylinder", cylinder)];
 
 const NOTED: &[(&str, &str)] = &[("silhouette_sampling_weight", "it matters to differentiable rendering only")];
 
+/// A flat shape has one normal whatever is asked for.
+const NOTED_FLAT: &[(&str, &str)] = &[NOTED[0], ("face_normals", "a rectangle is flat already")];
+
 impl Builder<'_> {
     /// A shape of the scene with its material and, if it shines, its radiance.
     pub(super) fn shape(&mut self, plugin: &Plugin) -> Result<()> {
-        let Some((_, construct)) = TABLE.iter().find(|(name, _)| *name == plugin.type_name) else {
-            return Err(unsupported(plugin, &TABLE.iter().map(|(name, _)| *name).collect::<Vec<_>>()));
-        };
+        let construct = constructor(TABLE, plugin)?;
         // Emitters are looked at first: a shape's default material depends on whether it shines.
         let emitters = plugin.children_of(Kind::Emitter, &self.tree.plugins);
         if let [_, second, ..] = emitters[..] {
@@ -30,17 +31,20 @@ impl Builder<'_> {
         let bsdfs = plugin.children_of(Kind::Bsdf, &self.tree.plugins);
         let bsdf = match bsdfs[..] {
             [] => self.unnamed_bsdf(radiance.is_some()),
-            [child] => self
-                .bsdf_number(child.target)
-                .map_err(|e| if child.position == e.position { e } else { e.via("used at", &child.position) })?,
+            [child] => self.bsdf_number(child.target).map_err(|e| {
+                let written_here = child.position == self.plugin(child.target).position;
+                if written_here { e } else { e.via("used at", &child.position) }
+            })?,
             [_, second, ..] => {
                 return Err(SceneError::new(&second.position, format!("a second bsdf in the {}", plugin.title()))
                     .help("nest them in a blendbsdf or a twosided"));
             }
         };
         let geometry = construct(self, plugin)?;
-        self.finish(plugin, NOTED)?;
+        let flat = plugin.type_name == "rectangle";
+        self.finish(plugin, if flat { NOTED_FLAT } else { NOTED })?;
         let name = plugin.id.clone().unwrap_or_else(|| format!("{} {}", plugin.type_name, self.shapes.len()));
+        self.shape_positions.push((name.clone(), plugin.position.clone()));
         self.shapes.push(Shape { name, geometry, bsdf, radiance });
         Ok(())
     }
@@ -67,7 +71,12 @@ fn rectangle(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {
 }
 
 fn cube(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {
-    Ok(Geometry::Mesh(Mesh::cube(to_world(plugin)?, flip_normals(plugin)?)))
+    let mut mesh = Mesh::cube(to_world(plugin)?, flip_normals(plugin)?);
+    // Seen only where to_world mirrors: the shading normals stay outside, those of the faces turn with the winding.
+    if plugin.boolean("face_normals", false)? {
+        mesh.normals = None;
+    }
+    Ok(Geometry::Mesh(mesh))
 }
 
 fn sphere(_: &mut Builder<'_>, plugin: &Plugin) -> Result<Geometry> {

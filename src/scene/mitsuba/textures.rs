@@ -1,6 +1,6 @@
 //! Colours and textures.
 
-use super::build::{Builder, degenerate, unsupported};
+use super::build::{Builder, Table, constructor, degenerate};
 use super::error::{Position, Result, SceneError};
 use super::files::resolve;
 use super::plugin::{Given, Kind, Plugin, PluginId, Property, Value};
@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Every texture. Adding one is its constructor and one line here.
-pub(super) const TABLE: &[(&str, fn(&mut Builder<'_>, &Plugin) -> Result<Texture>)] = &[("bitmap", bitmap), ("checkerboard", checkerboard)];
+pub(super) const TABLE: Table<Texture> = &[("bitmap", bitmap), ("checkerboard", checkerboard)];
 
 /// What a colour is for: which values make sense, and what a `spectrum` means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub(super) enum Role {
 }
 
 /// Linear Rec. 709 components of Mitsuba's `<spectrum value="1"/>` on an emitter: the equal-energy spectrum, not white (measured with 3.9.1).
-const EQUAL_ENERGY: [f64; 3] = [1.204_79, 0.948_291, 0.908_916];
+const EQUAL_ENERGY: [f64; 3] = [1.204_794, 0.948_291, 0.908_916];
 
 impl Role {
     fn holds(self, v: f32) -> bool {
@@ -97,9 +97,7 @@ impl Builder<'_> {
     /// The texture that a plugin describes.
     pub(super) fn texture(&mut self, id: PluginId) -> Result<Texture> {
         let plugin = self.plugin(id);
-        let Some((_, construct)) = TABLE.iter().find(|(name, _)| *name == plugin.type_name) else {
-            return Err(unsupported(plugin, &TABLE.iter().map(|(name, _)| *name).collect::<Vec<_>>()));
-        };
+        let construct = constructor(TABLE, plugin)?;
         let texture = construct(self, plugin)?;
         self.finish(
             plugin,

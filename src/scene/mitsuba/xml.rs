@@ -1,9 +1,9 @@
 //! First stage: XML files to a tree of plugins with typed parameters. Nothing here knows what a plugin means.
 
 use super::Note;
+use super::element::{check_attributes, check_version, kind_of, required, syntax_error, unknown_element, value_of};
 use super::error::{Position, Result, SceneError, excerpt, suggest};
 use super::files::{Files, resolve};
-use super::number;
 use super::plugin::{Child, Kind, Plugin, PluginId, Property, Value};
 use super::transform::{self, Attribute, OPERATIONS};
 use glam::DMat4;
@@ -117,7 +117,7 @@ impl Reader<'_> {
         }
         let text = self.text(path, named)?;
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &e))?;
+        let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &text, &e))?;
 
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
         let mut folders = vec![folder];
@@ -199,11 +199,11 @@ impl Reader<'_> {
         let mut plugin = Plugin::new(kind, type_name.value.clone(), id.map(|a| a.value.clone()), at, source.folders.clone());
         plugin.type_position = type_name.position.clone();
         let number = self.add(plugin)?;
-        if let Some(id) = id {
-            if let Some(previous) = self.ids.insert(id.value.clone(), number) {
-                let message = format!("the id \"{}\" is taken by {}", excerpt(&id.value), self.plugins[previous].position);
-                return Err(SceneError::new(&id.position, message).help("give every object an id of its own"));
-            }
+        if let Some(id) = id
+            && let Some(previous) = self.ids.insert(id.value.clone(), number)
+        {
+            let message = format!("the id \"{}\" is taken by {}", excerpt(&id.value), self.plugins[previous].position);
+            return Err(SceneError::new(&id.position, message).help("give every object an id of its own"));
         }
         self.contents(source, node, number, depth)?;
         Ok(number)
@@ -212,8 +212,9 @@ impl Reader<'_> {
     fn contents(&mut self, source: &Source<'_>, node: Node<'_, '_>, owner: PluginId, depth: usize) -> Result<()> {
         for child in node.children() {
             if child.is_text() && child.text().is_some_and(|t| !t.trim().is_empty()) {
-                let at = source.at(child);
-                let shown = excerpt(child.text().unwrap_or_default().trim());
+                let text = child.text().unwrap_or_default();
+                let at = source.position(child.range().start + (text.len() - text.trim_start().len()));
+                let shown = excerpt(text.trim());
                 return Err(SceneError::new(&at, format!("stray text \"{shown}\"")).help("values stand in attributes, remarks in <!-- -->"));
             }
             if child.is_element() {
@@ -484,115 +485,5 @@ impl Reader<'_> {
             }
         }
         Ok(())
-    }
-}
-
-// ---- one element -----------------------------------------------------------------------------------------------------------------
-
-fn kind_of(node: Node<'_, '_>) -> Option<Kind> {
-    Kind::ALL.iter().find(|(element, _)| *element == node.tag_name().name()).map(|(_, kind)| *kind)
-}
-
-fn unknown_element(at: &Position, element: &str) -> SceneError {
-    let supported = "default, include, ref, float, integer, boolean, string, rgb, spectrum, point, vector, transform, \
-                     sensor, film, rfilter, sampler, integrator, shape, bsdf, emitter, texture";
-    let names: Vec<&str> = supported.split(", ").map(str::trim).collect();
-    let message = match element {
-        "medium" | "phase" | "volume" => format!("<{element}>: participating media are not supported"),
-        "alias" | "path" => format!("<{element}> is not supported"),
-        _ => format!("<{}> is not an element of a scene", excerpt(element)),
-    };
-    SceneError::new(at, message).help(suggest(element, &names))
-}
-
-fn check_attributes(node: Node<'_, '_>, attributes: &[Attribute<'_>], allowed: &[&str]) -> Result<()> {
-    match attributes.iter().find(|a| !allowed.contains(&a.name)) {
-        None => Ok(()),
-        Some(a) => {
-            let message = format!("<{}> has no attribute \"{}\"", node.tag_name().name(), excerpt(a.name));
-            Err(SceneError::new(&a.position, message).help(suggest(a.name, allowed)))
-        }
-    }
-}
-
-fn required<'a, 'n>(node: Node<'_, '_>, attributes: &'a [Attribute<'n>], name: &str, at: &Position) -> Result<&'a Attribute<'n>> {
-    attributes
-        .iter()
-        .find(|a| a.name == name)
-        .ok_or_else(|| SceneError::new(at, format!("<{}> needs the attribute \"{name}\"", node.tag_name().name())))
-}
-
-fn check_version(version: &Attribute<'_>) -> Result<()> {
-    let parts: Vec<Option<u32>> = version.value.split('.').map(|part| part.parse().ok()).collect();
-    let wrong = |message: String| {
-        SceneError::new(&version.position, message).help("versions 3.x are supported; Mitsuba's own tools convert older scenes")
-    };
-    if parts.len() > 3 || parts.iter().any(Option::is_none) {
-        return Err(wrong(format!("\"{}\" is not a version", excerpt(&version.value))));
-    }
-    if parts[0] != Some(3) {
-        return Err(wrong(format!("the scene is of version {}", excerpt(&version.value))));
-    }
-    Ok(())
-}
-
-/// A parameter's value, and where it stands.
-fn value_of(element: &str, node: Node<'_, '_>, attributes: &[Attribute<'_>], at: &Position) -> Result<(Value, Position)> {
-    let wrong = |a: &Attribute<'_>, why: String| SceneError::new(&a.position, format!("{} of <{element}>: {why}", a.name));
-    if element == "spectrum" {
-        if let Some(file) = attributes.iter().find(|a| a.name == "filename") {
-            return Err(
-                wrong(file, "spectra from files are not supported".to_owned()).help("colours are RGB here: give one number, or <rgb>")
-            );
-        }
-    }
-    if element == "point" || element == "vector" {
-        let separate = ["x", "y", "z"].map(|axis| attributes.iter().find(|a| a.name == axis));
-        if separate.iter().any(Option::is_some) {
-            if let Some(all) = attributes.iter().find(|a| a.name == "value") {
-                return Err(wrong(all, "there are x, y, z too".to_owned()).help("give one of the two"));
-            }
-            let mut v = [0.0; 3];
-            for (value, axis) in v.iter_mut().zip(["x", "y", "z"]) {
-                let a = required(node, attributes, axis, at)?;
-                *value = number::number(&a.value).map_err(|why| wrong(a, why))?;
-            }
-            return Ok((Value::Vector(v), at.clone()));
-        }
-    }
-    let a = required(node, attributes, "value", at)?;
-    let fail = |why: String| wrong(a, why);
-    let value = match element {
-        "float" => Value::Float(number::number(&a.value).map_err(fail)?),
-        "integer" => Value::Integer(number::integer(&a.value).map_err(fail)?),
-        "boolean" if a.value.eq_ignore_ascii_case("true") => Value::Boolean(true),
-        "boolean" if a.value.eq_ignore_ascii_case("false") => Value::Boolean(false),
-        "boolean" => return Err(fail(format!("\"{}\" is neither true nor false", excerpt(&a.value)))),
-        "rgb" => Value::Rgb(number::one_or_three(&a.value).map_err(fail)?),
-        "point" | "vector" => Value::Vector(number::one_or_three(&a.value).map_err(fail)?),
-        "spectrum" => {
-            if a.value.contains(':') || number::words(&a.value).count() > 1 {
-                return Err(fail("wavelengths are not supported".to_owned()).help("colours are RGB here: give one number, or <rgb>"));
-            }
-            Value::Spectrum(number::number(&a.value).map_err(fail)?)
-        }
-        _ => Value::String(a.value.clone()),
-    };
-    Ok((value, a.position.clone()))
-}
-
-fn syntax_error(path: &Path, e: &roxmltree::Error) -> SceneError {
-    let position = match e {
-        roxmltree::Error::DtdDetected
-        | roxmltree::Error::NodesLimitReached
-        | roxmltree::Error::NoRootNode
-        | roxmltree::Error::UnclosedRootNode => Position::line(path, 1),
-        _ => Position { file: Arc::from(path), line: Some(e.pos().row), column: Some(e.pos().col) },
-    };
-    let error = SceneError::new(&position, format!("not well-formed XML: {e}"));
-    match e {
-        roxmltree::Error::DtdDetected => error.help("document types and entities are not read; use <default> and $name"),
-        roxmltree::Error::UnclosedRootNode => error.help("an element is not closed; the file may be cut off"),
-        _ => error,
     }
 }
