@@ -47,7 +47,7 @@ fn random_rays_do_not_leak() {
 
 /// The long form of the above: `cargo test --release --test rays -- --ignored`.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "half a minute to three"]
 fn slow_hundred_million_random_rays_do_not_leak() {
     let count = closed().len();
     for mesh in 0..count {
