@@ -55,7 +55,7 @@ pub struct TileReport {
     pub threshold: f64,
     /// Mean of the runs over mean of the reference, all channels and pixels that count.
     pub ratio: f64,
-    /// Half the width of the ratio's 95 % confidence interval.
+    /// Half the width of the ratio's 99 % confidence interval.
     pub ratio_half_width: f64,
 }
 
@@ -171,7 +171,7 @@ impl TileTest {
     }
 }
 
-/// Ratio of the means over pixels and channels, and half its 95 % interval (errors of both sides, first order).
+/// Ratio of the means over pixels and channels, and half its 99 % interval (errors of both sides, first order).
 fn ratio(runs: &[Vec<Rgb>], reference: &Reference, pixels: &[usize]) -> (f64, f64) {
     let channels: Vec<Vec<f64>> = (0..3).map(|c| run_means(runs, pixels, c)).collect();
     let totals: Vec<f64> = (0..runs.len()).map(|k| channels.iter().map(|c| c[k]).sum()).collect();
@@ -182,7 +182,7 @@ fn ratio(runs: &[Vec<Rgb>], reference: &Reference, pixels: &[usize]) -> (f64, f6
     let error: f64 = expected.iter().map(|s| s.variance.sqrt()).sum();
     let ratio = sample.mean / mean;
     let relative = (sample.variance / sample.mean.powi(2) + (error / mean).powi(2)).sqrt();
-    (ratio, ratio * relative * student_quantile(0.975, sample.freedom))
+    (ratio, ratio * relative * student_quantile(0.995, sample.freedom))
 }
 
 #[cfg(test)]

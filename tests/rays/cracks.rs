@@ -3,7 +3,7 @@
 use crate::shapes::{Mesh, bumpy, cuboid};
 use crate::{direction, point, rng, triangles};
 use glam::Vec3;
-use isophote::scene::accel::{Accel, Bvh};
+use isophote::scene::accel::{Accel, Bvh, Primitive};
 use isophote::scene::ray::Ray;
 use rand::RngExt;
 use rayon::prelude::*;
@@ -47,7 +47,7 @@ fn random_rays_do_not_leak() {
 
 /// The long form of the above: `cargo test --release --test rays -- --ignored`.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "half a minute to three"]
 fn slow_hundred_million_random_rays_do_not_leak() {
     let count = closed().len();
     for mesh in 0..count {
@@ -137,5 +137,44 @@ fn origins_close_to_the_surface_do_not_leak() {
         }
         let ray = Ray::new(o, direction(&mut rng));
         assert!(bvh.closest(&ray).is_some(), "{ray:?}");
+    }
+}
+
+/// An origin a few ulp off a triangle is on one side of it: it sees the triangle if and only if it looks towards it,
+/// however flat it looks.
+#[test]
+fn sides_of_a_triangle_are_never_confused() {
+    let mut rng = rng(16);
+    for size in [1e-2f32, 1.0, 30.0] {
+        for _ in 0..2000 {
+            let at = point(&mut rng) * 2.0;
+            let corners = [(); 3].map(|()| at + size * point(&mut rng));
+            let bvh = Bvh::build(&[Primitive::Triangle(corners)]);
+            let exact = corners.map(|c| c.as_dvec3());
+            let n = (exact[1] - exact[0]).cross(exact[2] - exact[0]);
+            let longest = (0..3).map(|i| exact[i].distance(exact[(i + 1) % 3])).fold(0.0, f64::max);
+            let narrow = n.length() / longest;
+            let n = n.normalize();
+            let (u, v) = (0.1 + 0.3 * rng.random::<f32>(), 0.1 + 0.3 * rng.random::<f32>());
+            let on = corners[0] + (corners[1] - corners[0]) * u + (corners[2] - corners[0]) * v;
+            for _ in 0..20 {
+                let off = 8.0 * f32::EPSILON * on.abs().max_element() * (rng.random::<f32>() - 0.5);
+                let o = on + n.as_vec3() * off;
+                let height = n.dot(o.as_dvec3() - exact[0]);
+                let flat = direction(&mut rng);
+                let flat = flat - n.as_vec3() * flat.dot(n.as_vec3());
+                let slope = 0.5 * (10.0 * (rng.random::<f32>() - 1.0)).exp2();
+                let d = flat.normalize() + n.as_vec3() * slope * if rng.random() { 1.0 } else { -1.0 };
+                let towards = -height * n.dot(d.as_dvec3());
+                let way = height / n.dot(d.as_dvec3()) * d.as_dvec3().length();
+                let hit = bvh.closest(&Ray::new(o, d));
+                // Below 1e-11 the oracle itself is in doubt.
+                if towards < -1e-11 {
+                    assert!(hit.is_none(), "{corners:?} {o} {d}: {hit:?} at height {height}");
+                } else if towards > 1e-11 && way.abs() < 0.05 * narrow {
+                    assert!(hit.is_some(), "{corners:?} {o} {d}: none at height {height}");
+                }
+            }
+        }
     }
 }

@@ -19,7 +19,7 @@ pub(super) enum Shape {
     Cylinder { to_object: DAffine3 },
 }
 
-/// Both roots of `a t^2 + 2 h t + c = 0`, the smaller first, given the discriminant `h^2 - a c` over `a`'s square or better.
+/// Both roots of `a t^2 + 2 h t + c = 0`, the smaller first. The caller knows a better way to `h^2 - a c`.
 #[inline(always)]
 fn roots(a: f64, h: f64, c: f64, discriminant: f64) -> Option<[f64; 2]> {
     if !(discriminant >= 0.0 && a > 0.0) {

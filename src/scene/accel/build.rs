@@ -138,7 +138,7 @@ fn bounds(primitive: &Primitive) -> Option<Bounds> {
             Bounds { min: a.min(*b).min(*c), max: a.max(*b).max(*c) }
         }
         Primitive::Sphere { center, radius } => {
-            if !(*radius > 0.0) {
+            if radius.is_nan() || *radius <= 0.0 {
                 return None;
             }
             let (c, r) = (center.as_dvec3(), DVec3::splat(f64::from(*radius)));

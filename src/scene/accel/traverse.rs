@@ -22,11 +22,8 @@ impl Bvh {
     #[inline(always)]
     fn fetch(&self, child: u32) {
         if child & LEAF == 0 {
-            if let Some(n) = self.nodes.get(child as usize) {
-                safe_arch::prefetch_t0(&n.x);
-                safe_arch::prefetch_t0(&n.y);
-                safe_arch::prefetch_t0(&n.z);
-                safe_arch::prefetch_t0(&n.child);
+            if let Some(node) = self.nodes.get(child as usize) {
+                node.fetch();
             }
         } else if let Some(t) = self.triangles.get((child & !LEAF) as usize) {
             t.fetch();
@@ -45,7 +42,7 @@ impl Bvh {
         let mut best = Best { t: ray.t_max * p.to_scaled, u: 0.0, v: 0.0, prim: EMPTY };
         let mut top = 0;
         let mut at = self.root;
-        if at == EMPTY || !(best.t > 0.0) {
+        if at == EMPTY || best.t.is_nan() || best.t <= 0.0 {
             return None;
         }
         loop {
@@ -128,7 +125,7 @@ impl Bvh {
         let t_max = ray.t_max * p.to_scaled;
         let mut top = 0;
         let mut at = self.root;
-        if at == EMPTY || !(t_max > 0.0) {
+        if at == EMPTY || t_max.is_nan() || t_max <= 0.0 {
             return false;
         }
         loop {

@@ -189,12 +189,17 @@ impl Binary {
                 self.fill(&costs, both[0], first, &mut kids);
                 self.fill(&costs, both[1], 8 - first, &mut kids);
             }
+            // The walk for any hit takes the last child first: the largest is likeliest to stop the ray.
+            kids.sort_by(|&a, &b| {
+                let area = |n: u32| half_area(&self.nodes[n as usize].bounds);
+                area(a).total_cmp(&area(b))
+            });
             let mut planes = [[[f32::INFINITY, f32::NEG_INFINITY]; 8]; 3];
             let mut child = [EMPTY; 8];
             for (lane, &kid) in kids.iter().enumerate() {
                 let b = &self.nodes[kid as usize].bounds;
-                for axis in 0..3 {
-                    planes[axis][lane] = [b.min[axis], b.max[axis]];
+                for (axis, planes) in planes.iter_mut().enumerate() {
+                    planes[lane] = [b.min[axis], b.max[axis]];
                 }
                 child[lane] = place(kid, &mut nodes, &mut todo);
             }

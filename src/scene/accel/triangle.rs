@@ -2,18 +2,20 @@
 //!
 //! [WOOP] S. Woop, C. Benthin, I. Wald: Watertight Ray/Triangle Intersection. JCGT 2(1), 2013.
 
+use super::node::fetch;
 use super::probe::Probe;
 use glam::{DVec3, Vec3};
 use wide::f32x4;
 
-/// Closer to the origin than this part of the triangle's extent along the ray, the sign of `t` is checked in f64.
-const DOUBTFUL: f32 = 32.0 / (1 << 24) as f32;
+/// Error of an edge function in units of the squared size of the triangle as seen from the origin: six roundings reach
+/// each of its four factors, two more its products; and all of that three times, once a corner.
+const DOUBTFUL: f32 = 64.0 / (1 << 24) as f32;
 
 /// Up to four triangles: three cache lines, one a corner. Absent ones are NaN throughout and never hit.
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(super) struct Tri4 {
-    /// `corner[i][axis]`, four triangles at once; `corner[0][3]` holds the bits of the primitives' numbers.
+    /// `corner[i][axis]`, four triangles at once; `corner[i][3]` the bits of the primitives' numbers.
     corner: [[f32x4; 4]; 3],
 }
 
@@ -46,14 +48,11 @@ impl Best {
 
 impl Tri4 {
     pub(super) fn new(triangles: &[(u32, [Vec3; 3])]) -> Self {
-        let lane = |f: &dyn Fn(&(u32, [Vec3; 3])) -> f32| {
-            let mut lanes = [f32::NAN; 4];
-            for (lane, triangle) in lanes.iter_mut().zip(triangles) {
-                *lane = f(triangle);
-            }
-            f32x4::new(lanes)
-        };
-        let corner = [0, 1, 2].map(|i| [lane(&|t| t.1[i].x), lane(&|t| t.1[i].y), lane(&|t| t.1[i].z), lane(&|t| f32::from_bits(t.0))]);
+        let absent = (0, [Vec3::NAN; 3]);
+        let four: [_; 4] = std::array::from_fn(|lane| triangles.get(lane).copied().unwrap_or(absent));
+        let axis = |i: usize, k: usize| f32x4::new(four.map(|(_, corners)| corners[i][k]));
+        let numbers = f32x4::new(four.map(|(number, _)| f32::from_bits(number)));
+        let corner = [0, 1, 2].map(|i| [axis(i, 0), axis(i, 1), axis(i, 2), numbers]);
         Self { corner }
     }
 
@@ -84,14 +83,19 @@ impl Tri4 {
         }
         // A triangle seen edge-on has sum 0 and NaN here, which no comparison below accepts.
         let scale = f32x4::ONE / (a + b + c);
-        let depth = (a * az + b * bz + c * cz) * scale;
+        let (w, u, v) = (a * scale, b * scale, c * scale);
+        let depth = w * az + u * bz + v * cz;
         let t = depth * p.inv_z;
-        let extent = az.abs().fast_max(bz.abs()).fast_max(cz.abs());
-        let doubtful = depth.abs().simd_le(extent * f32x4::splat(DOUBTFUL));
+        // Where the depth is below its own error: that of a weight, times the corners' depth.
+        let most = |a: f32x4, b: f32x4, c: f32x4| a.abs().fast_max(b.abs()).fast_max(c.abs());
+        let deep = most(az, bz, cz);
+        let large = deep.fast_max(most(ax, bx, cx)).fast_max(most(ay, by, cy));
+        let weight = large * large * scale.abs() * f32x4::splat(DOUBTFUL);
+        let doubtful = depth.abs().simd_le(weight * deep);
         let hit = inside & (doubtful | t.simd_gt(zero)) & t.simd_le(f32x4::splat(t_max));
         let mask = hit.to_bitmask();
         (mask != 0).then(|| {
-            let four = Four { t: t.to_array(), u: (b * scale).to_array(), v: (c * scale).to_array(), doubtful: doubtful.to_bitmask() };
+            let four = Four { t: t.to_array(), u: u.to_array(), v: v.to_array(), doubtful: doubtful.to_bitmask() };
             (mask, four)
         })
     }
@@ -107,7 +111,7 @@ impl Tri4 {
             let mut t = four.t[lane];
             if four.doubtful >> lane & 1 != 0 {
                 t = self.exactly(p, lane, t);
-                if !(t > 0.0) {
+                if t.is_nan() || t <= 0.0 {
                     continue;
                 }
             }
@@ -131,11 +135,10 @@ impl Tri4 {
         })
     }
 
+    /// Asks for the three cache lines.
     #[inline(always)]
     pub(super) fn fetch(&self) {
-        for corner in &self.corner {
-            safe_arch::prefetch_t0(corner);
-        }
+        self.corner.iter().for_each(fetch);
     }
 
     #[inline(always)]
