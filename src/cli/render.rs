@@ -43,7 +43,7 @@ struct RenderArgs {
     #[arg(long, value_name = "N|A:B")]
     iterations: Option<IterationRange>,
     /// Stop after S seconds of render time; the running iteration is finished
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     time: Option<f64>,
     /// Emitters do not show when seen directly
     #[arg(long)]
@@ -67,7 +67,7 @@ struct RenderArgs {
     #[arg(long, value_name = "WHEN")]
     snapshots: Option<Snapshots>,
     /// Save the unfinished image every S seconds
-    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds, allow_negative_numbers = true)]
     checkpoint: f64,
     /// Record the error against this image after each snapshot and at the end
     #[arg(long, value_name = "REF.exr")]
@@ -114,7 +114,7 @@ pub(super) fn run(matches: &ArgMatches, methods: &'static [Method], verbosity: V
     let arguments: RenderArgs = super::parsed(matches)?;
     let settings = (method.from_matches)(matches).map_err(|error| Failure::new(error.to_string()))?;
     let interrupt = Interrupt::default();
-    signals::listen(&interrupt)?;
+    signals::listen(&interrupt, verbosity)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.map_or(0, usize::from)).build();
     let pool = pool.map_err(|error| Failure::new(format!("cannot start threads: {error}")))?;
     pool.install(|| render_scene(&arguments, method, settings.as_ref(), verbosity, &interrupt))
