@@ -25,7 +25,7 @@ pub struct Common {
     pub min_depth: u32,
     /// Russian roulette starts at this many edges, where the method's roulette has a start.
     pub rr_depth: u32,
-    /// Emitters do not show when seen directly (depth 1).
+    /// The camera looks through emitters and sees no environment (depth 1), as in Mitsuba 3.
     pub hide_emitters: bool,
     /// Only paths whose class matches count (Heckbert letters from the light).
     pub paths: Option<regex::Regex>,

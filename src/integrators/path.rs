@@ -10,7 +10,7 @@ use crate::scene::bsdf::{Lobes, Mode};
 use crate::scene::emitter::EmitterKind;
 use crate::transport::class::PathClass;
 use crate::transport::shading::SurfacePoint;
-use crate::transport::walk::{CEILING, Tally};
+use crate::transport::walk::{CEILING, Tally, beyond_emitters};
 use clap::Args;
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
@@ -78,6 +78,9 @@ impl Path<'_> {
 
         let mut sum = Rgb::BLACK;
         let mut ray = camera_ray.ray;
+        if self.common.hide_emitters {
+            ray = beyond_emitters(scene, ray, tally).0;
+        }
         let mut throughput = Rgb::WHITE;
         let mut eta = 1.0f32;
         // Where the last direction left from, and its density; `None` where next event estimation could not have found it.

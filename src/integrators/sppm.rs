@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::scene::bsdf::{Lobes, Mode};
 use crate::targets::{LightPath, LightPaths};
 use crate::transport::shading::{SurfacePoint, sides_agree};
-use crate::transport::walk::{Roulette, Start, Step, Tally, walk};
+use crate::transport::walk::{Roulette, Start, Step, Tally, beyond_emitters, walk};
 use clap::Args;
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
@@ -135,7 +135,11 @@ impl Sppm<'_> {
     fn measure<S: Stream>(&self, film: Vec2, lens: Vec2, stream: &mut S, tally: &mut Tally) -> (Rgb, Option<MeasurementPoint<'_>>) {
         let camera = self.scene.camera();
         let camera_ray = camera.ray(film, lens);
-        let start = Start { ray: camera_ray.ray, throughput: Rgb::WHITE, length: camera_ray.start };
+        let mut start = Start { ray: camera_ray.ray, throughput: Rgb::WHITE, length: camera_ray.start };
+        if self.common.hide_emitters {
+            let (ray, passed) = beyond_emitters(self.scene, start.ray, tally);
+            start = Start { ray, length: start.length + passed, ..start };
+        }
         let (mut emission, mut measured) = (Rgb::BLACK, None);
         let counts = |depth: u32| {
             let hidden = depth == 1 && self.common.hide_emitters;

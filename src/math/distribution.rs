@@ -237,12 +237,12 @@ mod tests {
     fn linear_and_bilinear_warps_invert_their_densities() {
         // d(warp)/du is 1/density: compare on a fine grid.
         for (a, b) in [(1.0, 0.0), (0.0, 1.0), (0.2, 3.0), (1.0, 1.0), (5.0, 4.999)] {
-            for i in 1..100 {
+            for i in 5..95 {
                 let u = i as f32 / 100.0;
-                let h = 1e-2;
-                let slope = (linear((u + h).min(1.0), a, b) - linear(u - h, a, b)) / ((u + h).min(1.0) - (u - h));
+                let h = 5e-3;
+                let slope = (linear(u + h, a, b) - linear(u - h, a, b)) / (2.0 * h);
                 let density = 2.0 * (a + (b - a) * linear(u, a, b)) / (a + b);
-                assert!((slope * density - 1.0).abs() < 0.2, "{a} {b} {u}: {slope} {density}");
+                assert!((slope * density - 1.0).abs() < 5e-3, "{a} {b} {u}: {slope} {density}");
             }
             assert_eq!(linear(0.0, a, b), 0.0);
         }

@@ -6,4 +6,5 @@ mod gold_xml;
 mod hits;
 mod irradiance;
 mod kit;
+mod parts;
 mod sampling;

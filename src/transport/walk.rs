@@ -84,6 +84,21 @@ pub struct Escape {
     pub depth: u32,
 }
 
+/// The camera's ray beyond the emitters it meets first, with the length passed: what `hide_emitters` means in Mitsuba 3. A hidden emitter is
+/// hidden from the camera's first edge alone; it casts light, shows in mirrors, and blocks every other ray.
+pub fn beyond_emitters(scene: &Scene, mut ray: Ray, tally: &mut Tally) -> (Ray, f32) {
+    let mut passed = 0.0;
+    while let Some(hit) = scene.intersect(&ray) {
+        tally.rays += 1;
+        if hit.emitter.is_none() {
+            break;
+        }
+        passed += hit.t;
+        ray = Ray { t_max: ray.t_max - hit.t, ..hit.end.ray(ray.d) };
+    }
+    (ray, passed)
+}
+
 /// Russian roulette, local to the vertex: a walk survives with the share of light its scattering kept (largest component), and from
 /// `depth` edges on at most with [`CEILING`], so that lossless mirrors end too.
 #[derive(Clone, Copy, Debug)]

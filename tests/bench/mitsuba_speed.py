@@ -105,7 +105,10 @@ def main():
             done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
             if done.returncode:
                 sys.exit(f"{command[0]} ended with {done.returncode}")
-            other.append(json.loads(done.stdout))
+            try:
+                other.append({"cpu_seconds": float(json.loads(done.stdout)["cpu_seconds"])})
+            except (ValueError, KeyError, TypeError) as e:
+                sys.exit(f"{command[0]} printed no JSON document with cpu_seconds: {e!r}")
     for v in names:
         procs[v].stdin.close()
         procs[v].wait()

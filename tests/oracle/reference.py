@@ -93,6 +93,8 @@ def render(path, runs, spp, seed=0, max_depth=None, rr_depth=5, hide_emitters=Fa
     w, h = (int(x) for x in film.crop_size())
     per = spp if variant.startswith("scalar") else max(1, min(spp, WAVEFRONT // (w * h)))
     parts = [per] * (spp // per) + ([spp % per] if spp % per else [])
+    if keep:
+        os.makedirs(os.path.dirname(os.path.abspath(keep)), exist_ok=True)
     images, bad, cpu, wall = [], 0, time.process_time(), time.perf_counter()
     for i in range(runs):
         total = np.zeros((h, w, 3))
@@ -161,10 +163,18 @@ def main():
     p.add_argument("--variant", default="llvm_ad_rgb")
     p.add_argument("--threads", type=int, default=1)
     p.add_argument("-D", dest="defines", action="append", default=[], metavar="NAME=VALUE")
+    p.add_argument("--exact", type=float, metavar="VALUE", help="no rendering: the image is known to be VALUE everywhere (variance 0)")
     p.add_argument("--keep-runs", action="store_true", help="also NAME.00.exr, NAME.01.exr, ...")
     a = p.parse_args()
     if bool(a.scene) == bool(a.manifest) or bool(a.scene) != bool(a.out) or a.runs < 2:
         p.error("give SCENE and -o NAME, or --manifest; at least two runs")
+    if a.scene and a.exact is not None:
+        if not (a.width and a.height):
+            p.error("--exact needs --width and --height")
+        shape = (a.height, a.width, 3)
+        save(a.out, np.full(shape, a.exact), np.zeros(shape), {"sha256": content_hash(a.scene), "exact": a.exact, "width": a.width,
+                                                              "height": a.height, "runs": a.runs, "mean": [a.exact] * 3, "mean_stderr": [0.0] * 3})
+        return
     if a.scene:
         mean, var, info = render(a.scene, a.runs, a.spp, a.seed, a.max_depth, a.rr_depth, a.hide_emitters, a.width, a.height, a.variant,
                                  a.defines, a.integrator, a.out if a.keep_runs else None, a.threads)

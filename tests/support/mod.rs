@@ -8,12 +8,12 @@ use isophote::math::Rgb;
 use isophote::scene::mitsuba::{LoadOptions, LoadedScene, load};
 use std::path::{Path, PathBuf};
 
-pub fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// The folder of scenes and references beside the checkout, if it is there. Says so loudly where it is not.
-pub fn shared() -> Option<PathBuf> {
+pub(crate) fn shared() -> Option<PathBuf> {
     let folder = root().parent()?.join("shared");
     if folder.is_dir() {
         return Some(folder);
@@ -22,13 +22,13 @@ pub fn shared() -> Option<PathBuf> {
     None
 }
 
-pub fn load_file(file: &Path, resolution: Option<(u32, u32)>) -> LoadedScene {
+pub(crate) fn load_file(file: &Path, resolution: Option<(u32, u32)>) -> LoadedScene {
     let options = LoadOptions { resolution, ..Default::default() };
     load(file, &options).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// A scene from the text between `<scene>` and `</scene>`, with a 32 x 32 film unless the text has a sensor.
-pub fn load_text(body: &str) -> LoadedScene {
+pub(crate) fn load_text(body: &str) -> LoadedScene {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("scene.xml");
     std::fs::write(&file, format!("<scene version=\"3.0.0\">{body}</scene>")).unwrap();
@@ -36,7 +36,7 @@ pub fn load_text(body: &str) -> LoadedScene {
 }
 
 /// A perspective sensor of `n` x `n` pixels looking from `from` to `to`.
-pub fn sensor(from: [f32; 3], to: [f32; 3], up: [f32; 3], fov: f32, n: u32) -> String {
+pub(crate) fn sensor(from: [f32; 3], to: [f32; 3], up: [f32; 3], fov: f32, n: u32) -> String {
     let v = |a: [f32; 3]| format!("{}, {}, {}", a[0], a[1], a[2]);
     format!(
         "<sensor type=\"perspective\"><float name=\"fov\" value=\"{fov}\"/><float name=\"near_clip\" value=\"1e-5\"/>\
@@ -49,12 +49,12 @@ pub fn sensor(from: [f32; 3], to: [f32; 3], up: [f32; 3], fov: f32, n: u32) -> S
     )
 }
 
-pub fn common(seed: u64, max_depth: Option<u32>) -> Common {
+pub(crate) fn common(seed: u64, max_depth: Option<u32>) -> Common {
     Common { seed, max_depth, min_depth: 1, rr_depth: 5, hide_emitters: false, paths: None }
 }
 
 /// One run: the mean image of `iterations` iterations, and what they did.
-pub fn render(scene: &LoadedScene, method: &str, settings: &str, common: &Common, iterations: u64) -> (Vec<Rgb>, IterationStats) {
+pub(crate) fn render(scene: &LoadedScene, method: &str, settings: &str, common: &Common, iterations: u64) -> (Vec<Rgb>, IterationStats) {
     let entry = METHODS.iter().find(|m| m.name == method).unwrap();
     let settings = (entry.from_json)(&serde_json::from_str(settings).unwrap()).unwrap();
     let (width, height) = scene.scene.camera().resolution();
@@ -69,12 +69,12 @@ pub fn render(scene: &LoadedScene, method: &str, settings: &str, common: &Common
 }
 
 /// Independent runs, seeds 1, 2, ...
-pub fn runs(scene: &LoadedScene, method: &str, settings: &str, base: &Common, iterations: u64, seeds: u64) -> Vec<Vec<Rgb>> {
+pub(crate) fn runs(scene: &LoadedScene, method: &str, settings: &str, base: &Common, iterations: u64, seeds: u64) -> Vec<Vec<Rgb>> {
     (1..=seeds).map(|seed| render(scene, method, settings, &Common { seed, ..base.clone() }, iterations).0).collect()
 }
 
 /// `NAME.mean.exr` and `NAME.var.exr`.
-pub fn reference(stem: &Path, runs: usize) -> Reference {
+pub(crate) fn reference(stem: &Path, runs: usize) -> Reference {
     let read = |ending: &str| {
         let file = PathBuf::from(format!("{}.{ending}.exr", stem.display()));
         isophote::image::exr::read_picture(&file).unwrap_or_else(|e| panic!("{e}"))
@@ -84,6 +84,6 @@ pub fn reference(stem: &Path, runs: usize) -> Reference {
 }
 
 /// Mean of all channels of all pixels.
-pub fn image_mean(image: &[Rgb]) -> f64 {
+pub(crate) fn image_mean(image: &[Rgb]) -> f64 {
     image.iter().map(|c| f64::from(c.mean())).sum::<f64>() / image.len() as f64
 }

@@ -4,7 +4,7 @@
 //! HPG 2017. Which binary nodes become wide ones, and which subtrees one leaf, is the choice of least expected cost.
 
 use super::Bounds;
-use super::node::{ANALYTIC, LEAF, Node};
+use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::triangle::Tri4;
 use glam::Vec3;
 use wide::f32x8;
@@ -158,18 +158,17 @@ impl Binary {
         }
     }
 
-    /// Collapses the tree; nodes come out in depth-first order, leaves with their parents.
+    /// Collapses the tree. The children of a node lie side by side, subtrees follow depth first.
     pub(super) fn widen(&self, items: &[Item]) -> Wide {
         let costs = self.costs(items);
-        let mut nodes: Vec<Node> = Vec::new();
-        let mut triangles: Vec<Tri4> = Vec::new();
+        let mut nodes = Vec::new();
+        let mut triangles = Vec::new();
         let mut kids = Vec::with_capacity(8);
         let mut leaf = Vec::with_capacity(WIDTH as usize);
-        let mut root = 0;
-        // A subtree and the slot that waits for it.
-        let mut todo = vec![(0u32, None::<(usize, usize)>)];
-        while let Some((n, slot)) = todo.pop() {
-            let code = if let Some(place) = self.analytic(items, n) {
+        // A subtree that becomes a node, and its place.
+        let mut todo = Vec::new();
+        let mut place = |n: u32, nodes: &mut Vec<Node>, todo: &mut Vec<(u32, usize)>| {
+            if let Some(place) = self.analytic(items, n) {
                 LEAF | ANALYTIC | place
             } else if costs[n as usize].leaf {
                 leaf.clear();
@@ -177,29 +176,30 @@ impl Binary {
                 triangles.push(Tri4::new(&leaf));
                 LEAF | (triangles.len() - 1) as u32
             } else {
-                kids.clear();
-                if let Some(both) = self.children(n) {
-                    let (_, first) = Self::share(&costs, both, 8);
-                    self.fill(&costs, both[0], first, &mut kids);
-                    self.fill(&costs, both[1], 8 - first, &mut kids);
-                }
-                let mut planes = [[[f32::INFINITY, f32::NEG_INFINITY]; 8]; 3];
-                for (lane, &kid) in kids.iter().enumerate() {
-                    let b = &self.nodes[kid as usize].bounds;
-                    for axis in 0..3 {
-                        planes[axis][lane] = [b.min[axis], b.max[axis]];
-                    }
-                }
-                let pair = |axis: usize| [0, 1].map(|side| f32x8::new(planes[axis].map(|p| p[side])));
-                nodes.push(Node { x: pair(0), y: pair(1), z: pair(2), ..Node::NONE });
-                let me = nodes.len() - 1;
-                todo.extend(kids.iter().enumerate().rev().map(|(lane, &kid)| (kid, Some((me, lane)))));
-                me as u32
-            };
-            match slot {
-                Some((node, lane)) => nodes[node].child[lane] = code,
-                None => root = code,
+                nodes.push(Node::NONE);
+                todo.push((n, nodes.len() - 1));
+                (nodes.len() - 1) as u32
             }
+        };
+        let root = place(0, &mut nodes, &mut todo);
+        while let Some((n, me)) = todo.pop() {
+            kids.clear();
+            if let Some(both) = self.children(n) {
+                let (_, first) = Self::share(&costs, both, 8);
+                self.fill(&costs, both[0], first, &mut kids);
+                self.fill(&costs, both[1], 8 - first, &mut kids);
+            }
+            let mut planes = [[[f32::INFINITY, f32::NEG_INFINITY]; 8]; 3];
+            let mut child = [EMPTY; 8];
+            for (lane, &kid) in kids.iter().enumerate() {
+                let b = &self.nodes[kid as usize].bounds;
+                for axis in 0..3 {
+                    planes[axis][lane] = [b.min[axis], b.max[axis]];
+                }
+                child[lane] = place(kid, &mut nodes, &mut todo);
+            }
+            let pair = |axis: usize| [0, 1].map(|side| f32x8::new(planes[axis].map(|p| p[side])));
+            nodes[me] = Node { x: pair(0), y: pair(1), z: pair(2), child };
         }
         nodes.shrink_to_fit();
         triangles.shrink_to_fit();
@@ -212,7 +212,7 @@ impl Binary {
 fn stack_needed(nodes: &[Node]) -> usize {
     let mut needed = vec![0usize; nodes.len()];
     for (n, node) in nodes.iter().enumerate().rev() {
-        let present = node.child.iter().filter(|&&c| c != super::node::EMPTY);
+        let present = node.child.iter().filter(|&&c| c != EMPTY);
         let count = present.clone().count();
         let deepest = present.filter(|&&c| c & LEAF == 0).map(|&c| needed[c as usize]).max().unwrap_or(0);
         needed[n] = count.saturating_sub(1) + deepest;

@@ -1,6 +1,6 @@
 //! Smooth metal, black from behind.
 
-use super::{BsdfSample, Lobes, Mode};
+use super::{BsdfSample, Lobes, Mode, fresnel};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -17,31 +17,50 @@ pub struct Conductor {
 }
 
 impl Conductor {
+    #[inline(always)]
     pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
         Rgb::BLACK
     }
+
+    #[inline(always)]
     pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
         0.0
     }
-    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        let (wi, wo) = mode.roles(given, sampled);
-        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+
+    #[inline(always)]
+    pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
+        (Rgb::BLACK, 0.0)
     }
-    pub(super) fn sample(&self, _uv: Vec2, _given: Vec3, _mode: Mode, _lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        None
+
+    #[inline]
+    pub(super) fn sample(&self, uv: Vec2, given: Vec3, _mode: Mode, lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
+        if given.z <= 0.0 || !lobes.admit(0.0) {
+            return None;
+        }
+        let weight = fresnel::conductor(given.z, self.eta, self.k) * self.specular_reflectance.eval(uv);
+        let w = Vec3::new(-given.x, -given.y, given.z);
+        BsdfSample { w, weight, pdf_fwd: 1.0, pdf_rev: 1.0, delta: true, roughness: 0.0, eta: 1.0 }.if_not_black()
     }
-    pub(super) fn albedo(&self, _uv: Vec2, _given: Vec3, _lobes: Lobes) -> f32 {
-        0.0
+
+    pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
+        if given.z <= 0.0 || !lobes.admit(0.0) {
+            return 0.0;
+        }
+        (fresnel::conductor(given.z, self.eta, self.k) * self.specular_reflectance.eval(uv)).mean()
     }
-    pub(super) fn admitted_by(&self, _lobes: Lobes) -> bool {
-        false
+
+    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+        lobes.admit(0.0)
     }
+
     pub(super) fn max_roughness(&self) -> f32 {
         0.0
     }
+
     pub(super) fn anisotropic(&self) -> bool {
         false
     }
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

@@ -1,11 +1,14 @@
 //! Smooth glass.
 
-use super::{BsdfSample, Lobes, Mode};
+use super::{BsdfSample, Lobes, Mode, fresnel};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
 
 /// A smooth boundary between two dielectrics; light is reflected or refracted.
+///
+/// The lobe is chosen by the Fresnel term. Refracted radiance changes by the squared relative index ([VEACH 5.2]); what light paths
+/// carry does not.
 #[derive(Clone, Debug)]
 pub struct Dielectric {
     /// Index of refraction inside (against the normal) over outside (the normal's side); positive.
@@ -17,32 +20,62 @@ pub struct Dielectric {
 }
 
 impl Dielectric {
+    #[inline(always)]
     pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
         Rgb::BLACK
     }
+
+    #[inline(always)]
     pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
         0.0
     }
-    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        let (wi, wo) = mode.roles(given, sampled);
-        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+
+    #[inline(always)]
+    pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
+        (Rgb::BLACK, 0.0)
     }
-    pub(super) fn sample(&self, _uv: Vec2, _given: Vec3, _mode: Mode, _lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        None
+
+    #[inline]
+    pub(super) fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
+        if !lobes.admit(0.0) || given.z == 0.0 {
+            return None;
+        }
+        let at = fresnel::dielectric(given.z, self.eta);
+        let (w, weight, probability, eta) = if u_lobe < at.reflectance {
+            (Vec3::new(-given.x, -given.y, given.z), self.specular_reflectance.eval(uv), at.reflectance, 1.0)
+        } else {
+            let w = Vec3::new(-given.x / at.eta, -given.y / at.eta, at.cos_transmitted).normalize();
+            let scale = match mode {
+                Mode::Radiance => 1.0 / (at.eta * at.eta),
+                Mode::Importance => 1.0,
+            };
+            (w, self.specular_transmittance.eval(uv) * scale, 1.0 - at.reflectance, at.eta)
+        };
+        // The way back is chosen with the same probability: the Fresnel term is the same from both sides.
+        BsdfSample { w, weight, pdf_fwd: probability, pdf_rev: probability, delta: true, roughness: 0.0, eta }.if_not_black()
     }
-    pub(super) fn albedo(&self, _uv: Vec2, _given: Vec3, _lobes: Lobes) -> f32 {
-        0.0
+
+    pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
+        if !lobes.admit(0.0) || given.z == 0.0 {
+            return 0.0;
+        }
+        let reflectance = fresnel::dielectric(given.z, self.eta).reflectance;
+        self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), reflectance).mean()
     }
-    pub(super) fn admitted_by(&self, _lobes: Lobes) -> bool {
-        false
+
+    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+        lobes.admit(0.0)
     }
+
     pub(super) fn max_roughness(&self) -> f32 {
         0.0
     }
+
     pub(super) fn anisotropic(&self) -> bool {
         false
     }
+
     pub(super) fn transmissive(&self) -> bool {
-        false
+        true
     }
 }

@@ -73,6 +73,14 @@ pub struct BsdfSample {
     pub eta: f32,
 }
 
+impl BsdfSample {
+    /// Itself, or nothing if it carries nothing: the walk ends there.
+    #[inline(always)]
+    fn if_not_black(self) -> Option<Self> {
+        if self.weight.is_black() { None } else { Some(self) }
+    }
+}
+
 /// Every material. Adding one touches its own file, this list and one line of the loader's table.
 #[derive(Clone, Debug)]
 pub enum Bsdf {
@@ -177,6 +185,7 @@ impl Bsdf {
     }
 }
 
+mod beckmann;
 pub mod blend;
 pub mod conductor;
 pub mod dielectric;
@@ -191,4 +200,5 @@ pub mod roughconductor;
 pub mod roughdielectric;
 pub mod roughplastic;
 pub mod thindielectric;
+mod transmittance;
 pub mod twosided;

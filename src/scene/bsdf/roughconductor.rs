@@ -1,12 +1,12 @@
 //! Metal with a microfacet surface, black from behind.
 
-use super::microfacet::Microfacet;
-use super::{BsdfSample, Lobes, Mode};
+use super::microfacet::{Microfacet, NormalSampling, reflect};
+use super::{BsdfSample, Lobes, Mode, fresnel};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
 
-/// Microfacet reflection of a metal ([WALTER07 (20)]), single scattering.
+/// Microfacet reflection of a metal, `F D G1 G1 / (4 cos cos)` ([WALTER07 (20)] with separable shadowing), single scattering.
 #[derive(Clone, Debug)]
 pub struct RoughConductor {
     /// Distribution of the microfacets' normals.
@@ -20,31 +20,91 @@ pub struct RoughConductor {
 }
 
 impl RoughConductor {
-    pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
-        Rgb::BLACK
+    /// Does any light pass between these directions?
+    #[inline(always)]
+    fn blocked(&self, a: Vec3, b: Vec3, lobes: Lobes) -> bool {
+        a.z <= 0.0 || b.z <= 0.0 || !lobes.admit(self.distribution.roughness())
     }
-    pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
-        0.0
+
+    #[inline(always)]
+    fn fresnel(&self, uv: Vec2, cos: f32) -> Rgb {
+        fresnel::conductor(cos, self.eta, self.k) * self.specular_reflectance.eval(uv)
     }
-    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        let (wi, wo) = mode.roles(given, sampled);
-        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+
+    #[inline]
+    pub(super) fn eval(&self, uv: Vec2, wi: Vec3, wo: Vec3, lobes: Lobes) -> Rgb {
+        if self.blocked(wi, wo, lobes) {
+            return Rgb::BLACK;
+        }
+        let h = (wi + wo).normalize();
+        let m = &self.distribution;
+        self.fresnel(uv, wi.dot(h).clamp(0.0, 1.0)) * (0.25 * m.d(h) * m.g1_over_cos(wi) * m.g1_over_cos(wo))
     }
-    pub(super) fn sample(&self, _uv: Vec2, _given: Vec3, _mode: Mode, _lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        None
+
+    #[inline]
+    pub(super) fn pdf(&self, _uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
+        if self.blocked(given, sampled, lobes) {
+            return 0.0;
+        }
+        let h = (given + sampled).normalize();
+        self.distribution.reflection_pdf(given, h, given.dot(h), self.distribution.d(h))
     }
-    pub(super) fn albedo(&self, _uv: Vec2, _given: Vec3, _lobes: Lobes) -> f32 {
-        0.0
+
+    #[inline]
+    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, _mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        if self.blocked(given, sampled, lobes) {
+            return (Rgb::BLACK, 0.0);
+        }
+        let h = (given + sampled).normalize();
+        let (m, cos_h) = (&self.distribution, given.dot(h));
+        let d = m.d(h);
+        let f = self.fresnel(uv, cos_h.clamp(0.0, 1.0)) * (0.25 * d * m.g1_over_cos(given) * m.g1_over_cos(sampled));
+        (f, m.reflection_pdf(given, h, cos_h, d))
     }
-    pub(super) fn admitted_by(&self, _lobes: Lobes) -> bool {
-        false
+
+    #[inline]
+    pub(super) fn sample(&self, uv: Vec2, given: Vec3, _mode: Mode, lobes: Lobes, _u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let roughness = self.distribution.roughness();
+        if given.z <= 0.0 || !lobes.admit(roughness) {
+            return None;
+        }
+        let m = &self.distribution;
+        let h = m.sample(given, u);
+        let cos_h = given.dot(h);
+        let w = reflect(given, h);
+        if cos_h <= 0.0 || w.z <= 0.0 {
+            return None;
+        }
+        let d = m.d(h);
+        let (pdf_fwd, pdf_rev) = (m.reflection_pdf(given, h, cos_h, d), m.reflection_pdf(w, h, cos_h, d));
+        if pdf_fwd <= 0.0 {
+            return None;
+        }
+        // f cos / pdf with D, and what else is in both, cancelled.
+        let geometry = match m.sampling {
+            NormalSampling::Visible => m.g1_over_cos(given) / m.exact_g1_over_cos(given),
+            NormalSampling::All => m.g1_over_cos(given) * cos_h / h.z,
+        };
+        let weight = self.fresnel(uv, cos_h.min(1.0)) * (geometry * m.g1_over_cos(w) * w.z);
+        BsdfSample { w, weight, pdf_fwd, pdf_rev, delta: false, roughness, eta: 1.0 }.if_not_black()
     }
+
+    pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
+        if given.z <= 0.0 || !lobes.admit(self.distribution.roughness()) { 0.0 } else { self.fresnel(uv, given.z.min(1.0)).mean() }
+    }
+
+    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+        lobes.admit(self.distribution.roughness())
+    }
+
     pub(super) fn max_roughness(&self) -> f32 {
-        0.0
+        self.distribution.roughness()
     }
+
     pub(super) fn anisotropic(&self) -> bool {
-        false
+        self.distribution.anisotropic()
     }
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

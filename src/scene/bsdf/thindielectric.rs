@@ -1,6 +1,6 @@
 //! A thin smooth pane of glass.
 
-use super::{BsdfSample, Lobes, Mode};
+use super::{BsdfSample, Lobes, Mode, fresnel};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -17,32 +17,62 @@ pub struct ThinDielectric {
 }
 
 impl ThinDielectric {
+    /// Share reflected by both faces and all that happens between them: with `r` for one face, `r + (1-r)^2 r / (1-r^2)`.
+    #[inline(always)]
+    fn reflectance(&self, given: Vec3) -> f32 {
+        let r = fresnel::dielectric(given.z.abs(), self.eta).reflectance;
+        2.0 * r / (1.0 + r)
+    }
+
+    #[inline(always)]
     pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
         Rgb::BLACK
     }
+
+    #[inline(always)]
     pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
         0.0
     }
-    pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        let (wi, wo) = mode.roles(given, sampled);
-        (self.eval(uv, wi, wo, lobes), self.pdf(uv, given, sampled, lobes))
+
+    #[inline(always)]
+    pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
+        (Rgb::BLACK, 0.0)
     }
-    pub(super) fn sample(&self, _uv: Vec2, _given: Vec3, _mode: Mode, _lobes: Lobes, _u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
-        None
+
+    #[inline]
+    pub(super) fn sample(&self, uv: Vec2, given: Vec3, _mode: Mode, lobes: Lobes, u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
+        if !lobes.admit(0.0) || given.z == 0.0 {
+            return None;
+        }
+        let reflectance = self.reflectance(given);
+        let (w, weight, probability) = if u_lobe < reflectance {
+            (Vec3::new(-given.x, -given.y, given.z), self.specular_reflectance.eval(uv), reflectance)
+        } else {
+            (-given, self.specular_transmittance.eval(uv), 1.0 - reflectance)
+        };
+        BsdfSample { w, weight, pdf_fwd: probability, pdf_rev: probability, delta: true, roughness: 0.0, eta: 1.0 }.if_not_black()
     }
-    pub(super) fn albedo(&self, _uv: Vec2, _given: Vec3, _lobes: Lobes) -> f32 {
-        0.0
+
+    pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
+        if !lobes.admit(0.0) || given.z == 0.0 {
+            return 0.0;
+        }
+        self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), self.reflectance(given)).mean()
     }
-    pub(super) fn admitted_by(&self, _lobes: Lobes) -> bool {
-        false
+
+    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+        lobes.admit(0.0)
     }
+
     pub(super) fn max_roughness(&self) -> f32 {
         0.0
     }
+
     pub(super) fn anisotropic(&self) -> bool {
         false
     }
+
     pub(super) fn transmissive(&self) -> bool {
-        false
+        true
     }
 }

@@ -41,9 +41,9 @@ impl Sphere {
 
     /// World-space radius.
     pub fn radius(&self) -> f32 {
-        // Cube root of the volume's ratio: equal for all columns up to rounding.
+        // The columns' lengths are equal up to rounding.
         let m = self.to_world.matrix3;
-        ((m.x_axis.length() + m.y_axis.length() + m.z_axis.length()) / 3.0).abs()
+        (m.x_axis.length() + m.y_axis.length() + m.z_axis.length()) / 3.0
     }
 }
 

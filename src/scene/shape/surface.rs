@@ -116,8 +116,13 @@ impl Surfaces {
     fn push_triangle(&mut self, mesh: &Mesh, vertices: [usize; 3], shape: u32, primitives: &mut Vec<Primitive>) {
         let corners = vertices.map(|i| mesh.positions[i]);
         let sign = if mesh.flip_normals { -1.0 } else { 1.0 };
-        let n_g = geometric_normal(corners) * sign;
+        let mut n_g = geometric_normal(corners) * sign;
         let normals = mesh.normals.as_ref().map(|n| vertices.map(|i| n[i] * sign));
+        // A mirroring transform turns the winding and not the vertex normals; what the surface does follows the latter, so the
+        // geometric normal takes their side: only then does "the sides disagree" speak of interpolation and not of a file's winding.
+        if normals.is_some_and(|n| (n[0] + n[1] + n[2]).dot(n_g) < 0.0) {
+            n_g = -n_g;
+        }
         // Normals that say no more than the geometry, up to rounding, are left out.
         let normals = normals.filter(|n| !n.iter().all(|n| n.dot(n_g) > 1.0 - 4.0 * f32::EPSILON));
         let uvs = mesh.uvs.as_ref().map(|t| vertices.map(|i| t[i]));

@@ -15,7 +15,9 @@ fn folder() -> PathBuf {
 }
 
 fn gold(file: &str) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(folder().join(file)).unwrap()).unwrap()
+    // Mitsuba's own failures (a direction to a light that cannot be sampled) are written as NaN, which is no JSON.
+    let text = std::fs::read_to_string(folder().join(file)).unwrap().replace("NaN", "null");
+    serde_json::from_str(&text).unwrap()
 }
 
 fn f(value: &Value) -> f32 {
@@ -148,6 +150,14 @@ fn emitters_shine_as_mitsubas() {
         // --- radiance and density along directions
         for toward in list(&entry["toward"]) {
             let (p, d) = (vec3(&toward["p"]), vec3(&toward["d"]));
+            // From a point on the light itself Mitsuba's ray meets the light at once, ours does not.
+            if toward["dist"].as_f64().is_some_and(|dist| dist < 1e-3) {
+                continue;
+            }
+            // At the poles of an image the azimuth, and with it the radiance, is anything.
+            if name == "envmap" && d.y.abs() > 0.999_999 {
+                continue;
+            }
             let (emitted, distance) = match scene.intersect(&Ray::new(p + 1e-4 * d, d)) {
                 Some(hit) => (scene.emitted(&hit, -d, p), Some(hit.t + 1e-4)),
                 None => (scene.escaped(d), None),
