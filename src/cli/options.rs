@@ -65,7 +65,7 @@ impl FromStr for Size {
     fn from_str(text: &str) -> Result<Self, String> {
         let unit = |letter: char| "KMGT".find(letter.to_ascii_uppercase()).map(|i| 1_u64 << (10 * (i + 1)));
         let bare = text.trim_end_matches(['B', 'b']).trim_end_matches('i');
-        let (digits, unit) = match bare.chars().last().and_then(|last| unit(last)) {
+        let (digits, unit) = match bare.chars().last().and_then(unit) {
             Some(unit) => (&bare[..bare.len() - 1], unit),
             None => (bare, 1),
         };

@@ -13,12 +13,13 @@ use crate::render::{
     Bar, Budget, Interrupt, IterationRange, Layers, Lines, Metadata, Output, Plan, Progress, Reference, SceneRecord, Silent, Snapshots,
     render,
 };
-use crate::scene::mitsuba::{LoadedScene, RenderDefaults};
+use crate::scene::mitsuba::{FilmSize, LoadedScene, RenderDefaults};
 use clap::{ArgMatches, Args, Command, ValueEnum};
 use serde_json::{Map, Value, json};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Further layers of the EXR.
@@ -43,7 +44,7 @@ struct RenderArgs {
     #[arg(long, value_name = "N|A:B")]
     iterations: Option<IterationRange>,
     /// Stop after S seconds of render time; the running iteration is finished
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
     time: Option<f64>,
     /// Emitters do not show when seen directly
     #[arg(long)]
@@ -67,7 +68,7 @@ struct RenderArgs {
     #[arg(long, value_name = "WHEN")]
     snapshots: Option<Snapshots>,
     /// Save the unfinished image every S seconds
-    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value = "60", value_parser = seconds, allow_negative_numbers = true)]
     checkpoint: f64,
     /// Record the error against this image after each snapshot and at the end
     #[arg(long, value_name = "REF.exr")]
@@ -113,20 +114,14 @@ pub(super) fn run(matches: &ArgMatches, methods: &'static [Method], verbosity: V
     let method = methods.iter().find(|m| m.name == name).ok_or_else(|| Failure::new(format!("there is no method {name}")))?;
     let arguments: RenderArgs = super::parsed(matches)?;
     let settings = (method.from_matches)(matches).map_err(|error| Failure::new(error.to_string()))?;
-    let interrupt = Interrupt::default();
-    signals::listen(&interrupt)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.map_or(0, usize::from)).build();
     let pool = pool.map_err(|error| Failure::new(format!("cannot start threads: {error}")))?;
-    pool.install(|| render_scene(&arguments, method, settings.as_ref(), verbosity, &interrupt))
+    pool.install(|| render_scene(&arguments, method, settings.as_ref(), verbosity))
 }
 
-fn render_scene(
-    arguments: &RenderArgs,
-    method: &Method,
-    settings: &dyn BoxedSettings,
-    verbosity: Verbosity,
-    interrupt: &Interrupt,
-) -> Outcome {
+fn render_scene(arguments: &RenderArgs, method: &Method, settings: &dyn BoxedSettings, verbosity: Verbosity) -> Outcome {
+    let interrupt = Interrupt::default();
+    let rendering = signals::listen(&interrupt, verbosity)?;
     // What can be refused is refused before the scene is loaded, what is left before anything is rendered.
     let output = output_of(arguments, method.name)?;
     let reference = arguments.reference.as_ref().map(|path| read_picture(path).map(|picture| Reference { path: path.clone(), picture }));
@@ -148,10 +143,11 @@ fn render_scene(
         output,
     };
     let record = SceneRecord { path: arguments.scene.scene.display().to_string(), hash: loaded.content_hash.clone() };
-    let metadata = Metadata::new(record, method.name, settings_json(settings, &common, size, &arguments.scene.changes));
+    let metadata = Metadata::new(record, method.name, settings_json(settings, &common, &loaded.film, &arguments.scene.changes));
     let mut integrator = settings.build(&loaded.scene, size, &common)?;
     let mut progress = progress(verbosity);
-    let outcome = render(integrator.as_mut(), &plan, metadata, progress.as_mut(), interrupt)?;
+    rendering.store(true, Ordering::SeqCst);
+    let outcome = render(integrator.as_mut(), &plan, metadata, progress.as_mut(), &interrupt)?;
     report(arguments, &plan, &outcome, verbosity)
 }
 
@@ -205,15 +201,15 @@ fn common_of(arguments: &RenderArgs, defaults: &RenderDefaults) -> Common {
 }
 
 /// The method's settings and all others that decide the image.
-fn settings_json(settings: &dyn BoxedSettings, common: &Common, (width, height): (usize, usize), changes: &SceneChanges) -> Value {
+fn settings_json(settings: &dyn BoxedSettings, common: &Common, film: &FilmSize, changes: &SceneChanges) -> Value {
     let mut all = match settings.to_json() {
         Value::Object(map) => map,
         _ => Map::new(),
     };
     let define: Map<String, Value> = changes.define.iter().map(|d| (d.name.clone(), d.value.clone().into())).collect();
     let shared = json!({
-        "resolution": changes.resolution.map_or([width, height], |r| [r.width as usize, r.height as usize]),
-        "crop": changes.crop.map(|c| c.0),
+        "resolution": [film.width, film.height],
+        "crop": film.crop,
         "max_depth": common.max_depth.map_or(-1, i64::from),
         "min_depth": common.min_depth,
         "rr_depth": common.rr_depth,
@@ -269,8 +265,7 @@ fn report(arguments: &RenderArgs, plan: &Plan, outcome: &crate::render::Outcome,
         output::print_json(&document)?;
     }
     Ok(match outcome.interrupted {
-        // As a shell reports a program that a signal ended.
-        Some(signal) => ExitCode::from(u8::try_from(128 + signal).unwrap_or(1)),
+        Some(signal) => ExitCode::from(signals::status(signal)),
         None => ExitCode::SUCCESS,
     })
 }

@@ -120,9 +120,9 @@ impl Film {
         let width = self.sums.width;
         let row = |y: usize, sums: &mut [[f64; 3]], running: &mut [[f64; 3]]| {
             let mut state = start();
-            for x in 0..width {
+            for (x, sum) in sums.iter_mut().enumerate() {
                 let value = sample(&mut state, x, y).to_array().map(f64::from);
-                add(&mut sums[x], value);
+                add(sum, value);
                 if let Some(running) = running.get_mut(x) {
                     add(running, value);
                 }

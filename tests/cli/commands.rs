@@ -98,3 +98,36 @@ fn shells_get_completions() {
         assert!(script.contains("isophote") && METHODS.iter().all(|m| script.contains(m.name)), "{shell}");
     }
 }
+
+/// The examples of `docs/json.md`, in its order.
+fn examples() -> Vec<serde_json::Value> {
+    let page = include_str!("../../docs/json.md");
+    page.split("```json\n").skip(1).map(|rest| serde_json::from_str(rest.split("```").next().unwrap()).unwrap()).collect()
+}
+
+#[test]
+fn the_documented_examples_have_the_keys_that_are_printed() {
+    let bench = Bench::new();
+    let rendered = bench.json(&["render", "sppm", "lamp/scene.xml", "-o", "a.exr", "--json", "-q"]);
+    let printed = [
+        rendered,
+        bench.json(&["compare", "a.exr", "a.exr", "--json"]),
+        bench.json(&["info", "a.exr", "--json"]),
+        bench.json(&["info", "lamp/scene.xml", "--json"]),
+        bench.json(&["list", "--json"]),
+    ];
+    let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let examples = examples();
+    assert_eq!(examples.len(), printed.len());
+    for (example, printed) in examples.iter().zip(&printed) {
+        assert_eq!(keys(example), keys(printed));
+    }
+    for part in ["images", "channels", "methods", "samplers", "bsdfs", "metrics"] {
+        for (example, printed) in examples.iter().zip(&printed).filter(|(example, _)| example.get(part).is_some_and(|p| p.is_array())) {
+            assert_eq!(keys(&example[part][0]), keys(&printed[part][0]), "{part}");
+        }
+    }
+    for part in ["defaults", "counts", "memory", "film", "bounds"] {
+        assert_eq!(keys(&examples[3][part]), keys(&printed[3][part]), "{part}");
+    }
+}

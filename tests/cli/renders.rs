@@ -24,7 +24,7 @@ fn the_image_goes_to_the_folders_name_with_all_metadata() {
         assert_eq!(metadata["runs"], json!([{"seed": 0, "ranges": [[0, 3]]}]));
         assert_eq!(metadata["settings"]["define"], json!({"radiance": "7"}));
         assert_eq!(metadata["settings"]["max_depth"], 4);
-        assert_eq!(metadata["camera_paths"], 3 * 16 * 12);
+        assert!(metadata["camera_paths"].as_u64().unwrap() >= 3 * 16 * 12);
         assert!(metadata["rays"].as_u64().unwrap() >= 3 * 16 * 12 && metadata["seconds"].as_f64().unwrap() > 0.0);
         // What stands there makes the method again.
         assert!((method.from_json)(&metadata["settings"]).is_ok(), "{}", method.name);
