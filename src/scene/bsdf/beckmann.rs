@@ -11,7 +11,7 @@ pub(super) fn fitted_g1_over_cos(cos: f32, stretched: f32) -> f32 {
     (3.535 + 2.181 * a) / (stretched * (1.0 + (2.276 + 2.577 * a) * a))
 }
 
-/// `G1/cos` exactly: `1 / (cos (1 + Lambda))`, `Lambda = (erf a - 1)/2 + exp(-a^2)/(2 a sqrt(pi))` ([HEITZ14U (79)]).
+/// `G1/cos` exactly: `1 / (cos (1 + Lambda))`, `Lambda = (erf a - 1)/2 + exp(-a^2)/(2 a sqrt(pi))` (\[HEITZ14U\]).
 #[inline(always)]
 pub(super) fn exact_g1_over_cos(cos: f32, stretched: f32) -> f32 {
     // Beyond a = 4 the sum differs from the cosine by less than a rounding.
@@ -32,7 +32,7 @@ fn scaled_erfc(x: f32) -> f32 {
     t * (0.254_829_6 + t * (-0.284_496_74 + t * (1.421_413_7 + t * (-1.453_152 + t * 1.061_405_4))))
 }
 
-/// Inverse error function in (-1, 1), to about 1e-6 relative ([GILES10], single precision).
+/// Inverse error function in (-1, 1), to about 1e-6 relative (\[GILES10\], single precision).
 #[inline]
 fn erf_inv(x: f32) -> f32 {
     const CENTRE: [f32; 9] = [
@@ -74,7 +74,7 @@ const HALF_STEP: f32 = 0.5 / 16_777_216.0;
 /// A slope `x` along the direction `(sin, cos)`, with density in proportion to `exp(-x^2) max(0, cos - x sin)`: what the direction
 /// sees of a Gaussian surface.
 ///
-/// The distribution function is `cos (1 + b)/2 + sin exp(-x^2)/(2 sqrt(pi))` with `b = erf(x)` ([HEITZ14V], [JAKOB14]). It is concave
+/// The distribution function is `cos (1 + b)/2 + sin exp(-x^2)/(2 sqrt(pi))` with `b = erf(x)` (\[HEITZ14V\], \[JAKOB14\]). It is concave
 /// in `b`, so that Newton's method, kept between bounds, needs few steps.
 #[inline]
 pub(super) fn visible_slope(cos: f32, sin: f32, u: f32) -> f32 {

@@ -41,7 +41,7 @@ pub fn reflectance(cos: f32, cos_transmitted: f32, eta: f32) -> f32 {
     (0.5 * (r_s * r_s + r_p * r_p)).min(1.0)
 }
 
-/// Fresnel's equations for a metal of complex relative index `eta + i k`, at cosine `cos` in [0, 1] ([LAZANYI05], exact form).
+/// Fresnel's equations for a metal of complex relative index `eta + i k`, at cosine `cos` in [0, 1], exactly (\[MOELLER07\]).
 #[inline]
 pub fn conductor(cos: f32, eta: Rgb, k: Rgb) -> Rgb {
     let (eta, k) = (Vec3A::from_array(eta.to_array()), Vec3A::from_array(k.to_array()));
@@ -76,7 +76,7 @@ pub fn refract(w: Vec3, h: Vec3, at: &Interface) -> Vec3 {
 
 /// Share of diffuse light that a smooth boundary of relative index `eta` (far side over near side) reflects.
 ///
-/// Rational fits, as Mitsuba has them: for `eta < 1` [EGAN73], else [DEON11]; within 0.5 % of the integral.
+/// Rational fits, as Mitsuba has them: for `eta < 1` \[EGAN73\], else \[DEON11\]; within 0.6 % of the integral for indices up to 2.5.
 pub fn diffuse_reflectance(eta: f32) -> f32 {
     let inverse = 1.0 / eta;
     if eta < 1.0 {

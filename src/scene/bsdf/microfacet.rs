@@ -19,7 +19,7 @@ pub enum MicrofacetKind {
 /// How normals are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NormalSampling {
-    /// Those seen from the given direction, in proportion to what is seen of them ([HEITZ14V]).
+    /// Those seen from the given direction, in proportion to what is seen of them (\[HEITZ14V\]).
     Visible,
     /// All of them, in proportion to their projected area.
     All,
@@ -85,7 +85,7 @@ impl Microfacet {
 
     /// `G1(w)/|w.z|` as values use it; finite at grazing angles. The facet must be seen from its front.
     ///
-    /// For Beckmann, [WALTER07]'s rational fit (27), as Mitsuba has it.
+    /// For Beckmann, \[WALTER07\]'s rational fit (27), as Mitsuba has it.
     #[inline(always)]
     pub fn g1_over_cos(&self, w: Vec3) -> f32 {
         let (cos, s) = (w.z.abs(), self.stretched(w));
@@ -145,7 +145,7 @@ impl Microfacet {
         }
     }
 
-    /// The visible part of a stretched sphere is, seen in the mirror, a spherical cap: [DUPUY23].
+    /// The visible part of a stretched sphere is, seen in the mirror, a spherical cap: \[DUPUY23\].
     #[inline(always)]
     fn sample_visible_ggx(&self, w: Vec3, u: Vec2) -> Vec3 {
         let stretched = Vec3::new(w.x * self.alpha_u, w.y * self.alpha_v, w.z).normalize();

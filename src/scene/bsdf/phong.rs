@@ -6,7 +6,7 @@ use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
-/// `k_d / pi + k_s (n + 2)/(2 pi) cos^n(alpha)`, alpha between the mirror direction and the other ([LW94], [THESIS (3.1)]); black
+/// `k_d / pi + k_s (n + 2)/(2 pi) cos^n(alpha)`, alpha between the mirror direction and the other (\[LW94\], [THESIS (3.1)]); black
 /// from behind.
 ///
 /// One lobe is sampled, with its mean albedo as the odds. What the specular lobe sends below the surface is lost.

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// Smooth plastic: `F R_s` in the mirror direction, and `(1-F_i)(1-F_o) k_d / (pi eta^2 (1 - R))` with `R` what the coat's inside
-/// reflects of diffuse light, times `k_d` if nonlinear ([DEON11] and, for many bounces, the geometric series). Made by [`Plastic::new`].
+/// reflects of diffuse light, times `k_d` if nonlinear (\[DEON11\] and, for many bounces, the geometric series). Made by [`Plastic::new`].
 #[derive(Clone, Debug)]
 pub struct Plastic {
     /// Index of refraction of the coat over that outside; positive.

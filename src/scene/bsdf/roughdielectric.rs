@@ -109,7 +109,7 @@ impl RoughDielectric {
     }
 
     /// The distribution that normals are drawn from if all are: a little rougher towards grazing, which keeps weights small
-    /// ([WALTER07 5.3], with Mitsuba's square root).
+    /// ([WALTER07 5.3]).
     #[inline(always)]
     fn widened(&self, w: Vec3) -> Microfacet {
         match self.distribution.sampling {

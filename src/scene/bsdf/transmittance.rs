@@ -87,7 +87,7 @@ fn share(distribution: &Microfacet, nodes: &[(f32, f32)], cos: f32, eta: f32, th
     sum as f32
 }
 
-/// A visible normal by the projected area of the stretched hemisphere ([HEITZ18]): the map whose quadrature Mitsuba uses, not the one
+/// A visible normal by the projected area of the stretched hemisphere (\[HEITZ18\]): the map whose quadrature Mitsuba uses, not the one
 /// that directions are sampled with. `w`, stretched, lies in the xz plane.
 fn projected_ggx_normal(alpha: f32, w: Vec3, u: Vec2) -> Vec3 {
     let p = warp::disk(u);

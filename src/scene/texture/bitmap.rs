@@ -108,7 +108,7 @@ pub struct Bitmap {
     pub to_uv: Affine2,
 }
 
-/// The sRGB transfer function, from encoded to linear ([SRGB]).
+/// The sRGB transfer function, from encoded to linear (\[SRGB\]).
 fn srgb_to_linear(v: f32) -> f32 {
     if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }

@@ -122,13 +122,15 @@ fn cells(name: &str, given: Vec3) -> [usize; 2] {
 fn samples_follow_their_density() {
     let mut tests = Vec::new();
     for (name, b) in materials() {
-        if name.contains("smooth") {
+        // The sharpest lobes are left to the identities; what differs in value alone is sampled alike.
+        if ["smooth", "-linear", "0.05", "-spectrum", "-named"].iter().any(|n| name.contains(n)) {
             continue;
         }
         for (i, given) in given_directions().into_iter().enumerate() {
             // Every filter meets every material, some direction each.
-            for lobes in [FILTERS[0], FILTERS[i]] {
-                if b.admitted_by(lobes) && (i > 0 || lobes == Lobes::All) {
+            let filters = if i == 0 { &FILTERS[..1] } else { &[FILTERS[0], FILTERS[i]][..] };
+            for &lobes in filters {
+                if b.admitted_by(lobes) && lobes != Lobes::Smooth(2.0) {
                     let (p, evidence) = p_value(b, given, lobes, tests.len() as u64, cells(name, given));
                     tests.push((p, format!("{name}, given {given}, {lobes:?}: {evidence}")));
                 }
