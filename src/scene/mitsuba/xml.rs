@@ -1,10 +1,10 @@
 //! First stage: XML files to a tree of plugins with typed parameters. Nothing here knows what a plugin means.
 
 use super::Note;
-use super::element::{check_attributes, check_version, kind_of, required, syntax_error, unknown_element, value_of};
+use super::element::{check_attribute_counts, check_attributes, check_version, kind_of, required, syntax_error, unknown_element, value_of};
 use super::error::{Position, Result, SceneError, excerpt, suggest};
 use super::files::{Files, resolve};
-use super::plugin::{Child, Kind, Plugin, PluginId, Property, Value};
+use super::plugin::{Child, Kind, Plugin, PluginId, Property, Value, check_cycles};
 use super::transform::{self, Attribute, OPERATIONS};
 use glam::DMat4;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -52,7 +52,7 @@ pub(super) fn read(path: &Path, defines: &[(String, String)], files: &mut Files)
             .help("the outermost element must be <scene version=\"3.0.0\">"));
     }
     reader.link()?;
-    reader.check_cycles()?;
+    check_cycles(&reader.plugins)?;
     Ok(Tree { plugins: reader.plugins, root, notes: reader.notes })
 }
 
@@ -131,6 +131,7 @@ impl Reader<'_> {
             return Err(SceneError::new(named, format!("includes are nested more than {DEEPEST_INCLUDE} deep")));
         }
         let text = self.text(path, named)?;
+        check_attribute_counts(path, &text)?;
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &text, &e))?;
 
@@ -475,36 +476,6 @@ impl Reader<'_> {
                 return Err(SceneError::new(position, message).help(suggest(&reference.id, &names)));
             };
             self.plugins[reference.owner].children[reference.child].target = *target;
-        }
-        Ok(())
-    }
-
-    /// An object that contains itself through references has no end.
-    fn check_cycles(&self) -> Result<()> {
-        let mut done: HashSet<PluginId> = HashSet::new();
-        for start in 0..self.plugins.len() {
-            // Depth first without recursion: (plugin, next child); the chain of open plugins is the stack itself.
-            let mut stack = vec![(start, 0)];
-            let mut open: HashSet<PluginId> = HashSet::from([start]);
-            while let Some((plugin, next)) = stack.pop() {
-                if done.contains(&plugin) {
-                    open.remove(&plugin);
-                    continue;
-                }
-                let Some(child) = self.plugins[plugin].children.get(next) else {
-                    done.insert(plugin);
-                    open.remove(&plugin);
-                    continue;
-                };
-                stack.push((plugin, next + 1));
-                if !open.insert(child.target) {
-                    return Err(SceneError::new(
-                        &child.position,
-                        format!("the {} contains itself through this reference", self.plugins[child.target].title()),
-                    ));
-                }
-                stack.push((child.target, 0));
-            }
         }
         Ok(())
     }
