@@ -110,6 +110,7 @@ fn large_malformed_scenes_take_no_time() {
         ("many notes", many(50_000, |_| "<emitter type=\"point\"><float name=\"sampling_weight\" value=\"1\"/></emitter>\n".to_owned())),
         ("a long name", format!("<default name=\"a\" value=\"1\"/><shape type=\"${}\"/>", "b".repeat(1_000_000))),
         ("a long number", format!("<shape type=\"sphere\"><float name=\"radius\" value=\"{}\"/></shape>", "7".repeat(1_000_000))),
+        ("deep nesting", format!("{}{}", "<bsdf type=\"twosided\">".repeat(100_000), "</bsdf>".repeat(100_000))),
         ("many attributes", format!("<shape type=\"sphere\"{}/>", many(100_000, |i| format!(" a{i}=\"\"")))),
         ("a long list", format!("<shape type=\"sphere\"><point name=\"center\" value=\"{}\"/></shape>", "7 ".repeat(1_000_000))),
     ];
