@@ -1,6 +1,7 @@
 //! `docs/scenes.md` lists what the loader takes.
 
 use super::{load_files, scene};
+use isophote::scene::bsdf::ior::{CONDUCTORS, DIELECTRICS};
 use isophote::scene::mitsuba::{LoadOptions, supported};
 
 /// A plugin with the least it needs, and a parameter nobody knows: the error lists those it takes.
@@ -55,4 +56,12 @@ fn every_plugin_and_parameter_is_documented() {
         );
     }
     assert!(missing.is_empty(), "docs/scenes.md lacks {missing:#?}");
+}
+
+#[test]
+fn every_medium_and_metal_is_documented() {
+    let text = include_str!("../../docs/scenes.md");
+    let names = DIELECTRICS.iter().map(|(name, _)| *name).chain(CONDUCTORS.iter().map(|(name, _, _)| *name));
+    let missing: Vec<&str> = names.filter(|name| !text.contains(&format!("`{name}`"))).collect();
+    assert!(missing.is_empty(), "docs/scenes.md lacks {missing:?}");
 }

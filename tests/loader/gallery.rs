@@ -91,3 +91,34 @@ fn every_file_of_the_gallery_is_in_the_table() {
         }
     }
 }
+
+/// What grows with the square of a file's size in a careless loader; each is too large to be kept as a file.
+#[test]
+fn large_malformed_scenes_take_no_time() {
+    let wrap = |body: &str| format!("<scene version=\"3.0.0\">\n{body}\n</scene>");
+    let many = |count: usize, line: fn(usize) -> String| (0..count).map(line).collect::<String>();
+    let cases = [
+        ("many parameters", format!("<shape type=\"sphere\">{}</shape>", many(100_000, |i| format!("<float name=\"p{i}\" value=\"1\"/>")))),
+        ("many named shapes", many(100_000, |i| format!("<shape type=\"sphere\" name=\"s{i}\"/>"))),
+        (
+            "many ids",
+            format!(
+                "{}<shape type=\"sphere\"><ref id=\"nobody\"/></shape>",
+                many(100_000, |i| format!("<bsdf type=\"diffuse\" id=\"id{i}\"/>"))
+            ),
+        ),
+        ("many notes", many(50_000, |_| "<emitter type=\"point\"><float name=\"sampling_weight\" value=\"1\"/></emitter>\n".to_owned())),
+        ("a long name", format!("<default name=\"a\" value=\"1\"/><shape type=\"${}\"/>", "b".repeat(1_000_000))),
+        ("a long number", format!("<shape type=\"sphere\"><float name=\"radius\" value=\"{}\"/></shape>", "7".repeat(1_000_000))),
+        ("deep nesting", format!("{}{}", "<bsdf type=\"twosided\">".repeat(100_000), "</bsdf>".repeat(100_000))),
+        ("many attributes", format!("<shape type=\"sphere\"{}/>", many(100_000, |i| format!(" a{i}=\"\"")))),
+        ("a long list", format!("<shape type=\"sphere\"><point name=\"center\" value=\"{}\"/></shape>", "7 ".repeat(1_000_000))),
+    ];
+    for (what, body) in cases {
+        let start = Instant::now();
+        let error = super::load_files(&[("scene.xml", &wrap(&body))], &LoadOptions::default()).expect_err(what).to_string();
+        // A second each would do alone; the tests run side by side.
+        assert!(start.elapsed() < Duration::from_secs(4), "{what} took {:?}", start.elapsed());
+        assert!(error.len() < 5000 && error.contains("scene.xml"), "{what}: {} bytes of message", error.len());
+    }
+}

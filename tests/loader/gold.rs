@@ -55,8 +55,11 @@ fn rgb(v: &Value) -> Rgb {
     Rgb::new(v[0], v[1], v[2])
 }
 
-/// Largest difference, relative to the larger of the expected values and `scale`.
+/// Largest difference, relative to the larger of the expected values and `scale`; infinite where a value is not finite.
 fn error(found: &[f32], expected: &[f32], scale: f32) -> f32 {
+    if found.len() != expected.len() || !found.iter().all(|v| v.is_finite()) {
+        return f32::INFINITY;
+    }
     let largest = expected.iter().fold(scale, |a, b| a.max(b.abs()));
     found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest
 }
@@ -76,8 +79,7 @@ impl Report {
     fn compare(&mut self, what: &str, found: &[f32], expected: &[f32], scale: f32) {
         self.compared += 1;
         let off = error(found, expected, scale);
-        // A NaN is off too.
-        if !(off <= self.tolerance) {
+        if off > self.tolerance {
             self.wrong.push(format!("{what}: {found:?} instead of {expected:?}"));
         }
     }

@@ -1,5 +1,7 @@
 //! The scene loader: what it takes, with which defaults and values; what it refuses, with which words.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
 mod documentation;
 mod fuzz;
 mod gallery;

@@ -11,7 +11,7 @@ use crate::scene::shape::Shape;
 use crate::scene::texture::Texels;
 use crate::scene::{BsdfId, SceneParts};
 use glam::{Affine3A, DMat4};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -27,6 +27,7 @@ pub(super) struct Builder<'a> {
     pub(super) tree: &'a Tree,
     pub(super) files: &'a mut Files,
     notes: Vec<Note>,
+    noted: HashSet<Note>,
     /// Materials that shapes use, and where each went.
     pub(super) bsdfs: Vec<Bsdf>,
     pub(super) bsdf_numbers: HashMap<PluginId, BsdfId>,
@@ -50,6 +51,7 @@ impl<'a> Builder<'a> {
             tree,
             files,
             notes: Vec::new(),
+            noted: HashSet::new(),
             bsdfs: Vec::new(),
             bsdf_numbers: HashMap::new(),
             built_bsdfs: HashMap::new(),
@@ -69,7 +71,7 @@ impl<'a> Builder<'a> {
     pub(super) fn note(&mut self, position: &Position, message: impl Into<String>) {
         let note = Note::new(position, message.into());
         // A material shared by many shapes would say the same many times.
-        if !self.notes.contains(&note) {
+        if self.noted.insert(note.clone()) {
             self.notes.push(note);
         }
     }
@@ -83,7 +85,7 @@ impl<'a> Builder<'a> {
         let mut notes = Vec::new();
         plugin.finish(noted, &self.tree.plugins, |position, message| notes.push(Note::new(position, message)))?;
         for note in notes {
-            if !self.notes.contains(&note) {
+            if self.noted.insert(note.clone()) {
                 self.notes.push(note);
             }
         }

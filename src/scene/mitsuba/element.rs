@@ -124,3 +124,23 @@ pub(super) fn syntax_error(path: &Path, text: &str, e: &roxmltree::Error) -> Sce
         _ => error,
     }
 }
+
+/// The parser compares each attribute of an element with all the others, so their number must be bounded before it reads the file.
+pub(super) fn check_attribute_counts(path: &Path, text: &str) -> Result<()> {
+    const MOST_ATTRIBUTES: usize = 4096;
+    let mut end = 0;
+    for tag in text.split('<').skip(1) {
+        let start = end + 1;
+        end = start + tag.len();
+        let inside = tag.split('>').next().unwrap_or_default();
+        if !inside.starts_with(['!', '?']) && inside.bytes().filter(|byte| *byte == b'=').count() > MOST_ATTRIBUTES {
+            let before = text.len().min(text.find('<').unwrap_or(0) + start);
+            let line = text.as_bytes()[..before].iter().filter(|byte| **byte == b'\n').count() + 1;
+            return Err(SceneError::new(
+                &Position::line(path, line as u32),
+                format!("an element with more than {MOST_ATTRIBUTES} attributes"),
+            ));
+        }
+    }
+    Ok(())
+}

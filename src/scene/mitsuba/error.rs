@@ -98,14 +98,21 @@ pub(crate) type Result<T> = std::result::Result<T, SceneError>;
 
 /// "did you mean ..., or one of: ..." for a name that is none of `known`.
 pub(super) fn suggest(name: &str, known: &[&str]) -> String {
+    // A scene may have a million ids; nobody reads a list of them.
+    const MOST_LISTED: usize = 40;
     let mut known: Vec<&str> = known.to_vec();
     known.sort_unstable();
     known.dedup();
-    let closest = known.iter().map(|k| (edit_distance(name, k), *k)).min();
-    let list = known.join(", ");
+    let mut list = known.iter().take(MOST_LISTED).map(|word| excerpt(word)).collect::<Vec<_>>().join(", ");
+    if known.len() > MOST_LISTED {
+        list.push_str(&format!(" and {} more", known.len() - MOST_LISTED));
+    }
+    // A third of the letters wrong is a slip of the hand; more is another word.
+    let slip = name.chars().count().max(3) / 3;
+    let near = known.iter().filter(|word| word.len().abs_diff(name.len()) <= 4 * slip).take(10_000);
+    let closest = near.map(|word| (edit_distance(name, word), *word)).min();
     match closest {
-        // A third of the letters wrong is a slip of the hand; more is another word.
-        Some((distance, word)) if 3 * distance <= word.chars().count().max(3) => format!("did you mean \"{word}\"? supported: {list}"),
+        Some((distance, word)) if distance <= slip => format!("did you mean \"{}\"? supported: {list}", excerpt(word)),
         _ if known.is_empty() => "none is supported here".to_owned(),
         _ => format!("supported: {list}"),
     }

@@ -62,7 +62,7 @@ pub struct RenderDefaults {
 }
 
 /// Something a scene says that is read but does not change the image, or that is done differently here.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Note {
     /// The file.
     pub file: PathBuf,

@@ -3,6 +3,7 @@
 use super::error::{Position, Result, SceneError, suggest};
 use glam::{DMat4, DVec3};
 use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -347,4 +348,34 @@ impl<T> Given<T> {
             Err(SceneError::new(&self.position, format!("\"{name}\" is {:?}, it must be {rule}", self.value)))
         }
     }
+}
+
+/// An object that contains itself through references has no end.
+pub(super) fn check_cycles(plugins: &[Plugin]) -> Result<()> {
+    let mut done: HashSet<PluginId> = HashSet::new();
+    for start in 0..plugins.len() {
+        // Depth first without recursion: (plugin, next child); the chain of open plugins is the stack itself.
+        let mut stack = vec![(start, 0)];
+        let mut open: HashSet<PluginId> = HashSet::from([start]);
+        while let Some((plugin, next)) = stack.pop() {
+            if done.contains(&plugin) {
+                open.remove(&plugin);
+                continue;
+            }
+            let Some(child) = plugins[plugin].children.get(next) else {
+                done.insert(plugin);
+                open.remove(&plugin);
+                continue;
+            };
+            stack.push((plugin, next + 1));
+            if !open.insert(child.target) {
+                return Err(SceneError::new(
+                    &child.position,
+                    format!("the {} contains itself through this reference", plugins[child.target].title()),
+                ));
+            }
+            stack.push((child.target, 0));
+        }
+    }
+    Ok(())
 }

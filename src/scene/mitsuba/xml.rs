@@ -1,10 +1,10 @@
 //! First stage: XML files to a tree of plugins with typed parameters. Nothing here knows what a plugin means.
 
 use super::Note;
-use super::element::{check_attributes, check_version, kind_of, required, syntax_error, unknown_element, value_of};
+use super::element::{check_attribute_counts, check_attributes, check_version, kind_of, required, syntax_error, unknown_element, value_of};
 use super::error::{Position, Result, SceneError, excerpt, suggest};
 use super::files::{Files, resolve};
-use super::plugin::{Child, Kind, Plugin, PluginId, Property, Value};
+use super::plugin::{Child, Kind, Plugin, PluginId, Property, Value, check_cycles};
 use super::transform::{self, Attribute, OPERATIONS};
 use glam::DMat4;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -18,6 +18,7 @@ const DEEPEST_INCLUDE: usize = 15;
 const DEEPEST_OBJECT: usize = 32;
 const LARGEST_XML: usize = 64 << 20;
 const LONGEST_ATTRIBUTE: usize = 1 << 20;
+const LONGEST_NAME: usize = 64;
 const MOST_NODES: u32 = 4_000_000;
 const MOST_PLUGINS: usize = 1_000_000;
 
@@ -36,6 +37,7 @@ pub(super) fn read(path: &Path, defines: &[(String, String)], files: &mut Files)
         plugins: Vec::new(),
         references: Vec::new(),
         ids: HashMap::new(),
+        names: HashSet::new(),
         notes: Vec::new(),
         open: Vec::new(),
     };
@@ -50,7 +52,7 @@ pub(super) fn read(path: &Path, defines: &[(String, String)], files: &mut Files)
             .help("the outermost element must be <scene version=\"3.0.0\">"));
     }
     reader.link()?;
-    reader.check_cycles()?;
+    check_cycles(&reader.plugins)?;
     Ok(Tree { plugins: reader.plugins, root, notes: reader.notes })
 }
 
@@ -76,14 +78,25 @@ struct Source<'a> {
     file: Arc<Path>,
     line_starts: Vec<usize>,
     folders: Arc<[PathBuf]>,
+    /// The byte and the column of the last position.
+    last: Cell<(usize, usize)>,
 }
 
 impl Source<'_> {
-    /// Line and column of a byte, as `Document::text_pos_at` counts them but without a scan from the start.
+    /// Line and column of a byte, as `Document::text_pos_at` counts them, but without a scan from the start: the file may be one long line,
+    /// so the column is counted from the last one asked for.
     fn position(&self, byte: usize) -> Position {
         let line = self.line_starts.partition_point(|start| *start <= byte).max(1);
-        let text = self.document.input_text();
-        let column = text.get(self.line_starts[line - 1]..byte).map_or(0, |before| before.chars().count()) + 1;
+        let start = self.line_starts[line - 1];
+        let characters = |from: usize, to: usize| self.document.input_text().get(from..to).map_or(0, |text| text.chars().count());
+        let column = match self.last.get() {
+            (last_byte, last) if last_byte >= start && last_byte <= byte => last + characters(last_byte, byte),
+            (last_byte, last) if last_byte > byte && self.line_starts.get(line).is_none_or(|next| last_byte < *next) => {
+                last - characters(byte, last_byte)
+            }
+            _ => characters(start, byte) + 1,
+        };
+        self.last.set((byte, column));
         Position { file: self.file.clone(), line: Some(line as u32), column: Some(column as u32) }
     }
 
@@ -98,6 +111,8 @@ struct Reader<'f> {
     plugins: Vec<Plugin>,
     references: Vec<Reference>,
     ids: HashMap<String, PluginId>,
+    /// Names of parameters and nested objects given so far.
+    names: HashSet<(PluginId, String)>,
     notes: Vec<Note>,
     /// Files being read, outermost first: a file that includes itself never ends.
     open: Vec<PathBuf>,
@@ -116,6 +131,7 @@ impl Reader<'_> {
             return Err(SceneError::new(named, format!("includes are nested more than {DEEPEST_INCLUDE} deep")));
         }
         let text = self.text(path, named)?;
+        check_attribute_counts(path, &text)?;
         let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(&text, options).map_err(|e| syntax_error(path, &text, &e))?;
 
@@ -123,7 +139,8 @@ impl Reader<'_> {
         let mut folders = vec![folder];
         folders.extend_from_slice(outer);
         let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect();
-        let source = Source { document: &document, file: Arc::from(path), line_starts, folders: Arc::from(folders) };
+        let source =
+            Source { document: &document, file: Arc::from(path), line_starts, folders: Arc::from(folders), last: Cell::new((0, 1)) };
 
         self.open.push(identity);
         let root = self.root(&source, parent);
@@ -256,8 +273,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn check_free(&self, owner: PluginId, name: &str, position: &Position) -> Result<()> {
-        if !name.is_empty() && self.plugins[owner].has(name) {
+    fn check_free(&mut self, owner: PluginId, name: &str, position: &Position) -> Result<()> {
+        if !name.is_empty() && !self.names.insert((owner, name.to_owned())) {
             let message = format!("\"{}\" of the {} is given twice", excerpt(name), self.plugins[owner].title());
             return Err(SceneError::new(position, message).help(format!("the other is at {}", self.plugins[owner].place(name))));
         }
@@ -300,9 +317,10 @@ impl Reader<'_> {
         self.check_childless(node, &at)?;
         let name = required(node, attributes, "name", &at)?;
         let value = required(node, attributes, "value", &at)?;
-        if name.value.is_empty() || !name.value.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
+        let named = !name.value.is_empty() && name.value.len() <= LONGEST_NAME;
+        if !named || !name.value.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
             return Err(SceneError::new(&name.position, format!("\"{}\" is no name for a parameter", excerpt(&name.value)))
-                .help("letters, digits and _ are allowed"));
+                .help(format!("up to {LONGEST_NAME} letters, digits and _ are allowed")));
         }
         let value = value.value.clone();
         // What was given before, with -D or by an earlier default, stays. A -D of a declared name is known even where nothing uses it.
@@ -397,6 +415,9 @@ impl Reader<'_> {
         if !text.contains('$') {
             return Ok(text.to_owned());
         }
+        if text.len() > LONGEST_ATTRIBUTE {
+            return Err(SceneError::new(at, format!("an attribute of {} bytes with a $ in it", text.len())));
+        }
         let mut out = String::new();
         let mut rest = text;
         while let Some(dollar) = rest.find('$') {
@@ -409,6 +430,8 @@ impl Reader<'_> {
             }
             out.push_str(before);
             let length = after.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(after.len());
+            // No known name is longer.
+            let length = length.min(LONGEST_NAME);
             // The longest name that is known, as in Mitsuba: "$resx" may be "$res" followed by an x.
             let known = (1..=length).rev().find(|end| self.parameters.contains_key(&after[..*end]));
             let Some(parameter) = known.and_then(|end| self.parameters.get_mut(&after[..end]).map(|p| (end, p))) else {
@@ -453,36 +476,6 @@ impl Reader<'_> {
                 return Err(SceneError::new(position, message).help(suggest(&reference.id, &names)));
             };
             self.plugins[reference.owner].children[reference.child].target = *target;
-        }
-        Ok(())
-    }
-
-    /// An object that contains itself through references has no end.
-    fn check_cycles(&self) -> Result<()> {
-        let mut done: HashSet<PluginId> = HashSet::new();
-        for start in 0..self.plugins.len() {
-            // Depth first without recursion: (plugin, next child); the chain of open plugins is the stack itself.
-            let mut stack = vec![(start, 0)];
-            let mut open: HashSet<PluginId> = HashSet::from([start]);
-            while let Some((plugin, next)) = stack.pop() {
-                if done.contains(&plugin) {
-                    open.remove(&plugin);
-                    continue;
-                }
-                let Some(child) = self.plugins[plugin].children.get(next) else {
-                    done.insert(plugin);
-                    open.remove(&plugin);
-                    continue;
-                };
-                stack.push((plugin, next + 1));
-                if !open.insert(child.target) {
-                    return Err(SceneError::new(
-                        &child.position,
-                        format!("the {} contains itself through this reference", self.plugins[child.target].title()),
-                    ));
-                }
-                stack.push((child.target, 0));
-            }
         }
         Ok(())
     }
