@@ -21,11 +21,11 @@ pub enum Texture {
 /// Squares of side 1/2 in `to_uv uv`: `color0` in the one at the origin and along the diagonals, `color1` in between.
 #[derive(Clone, Debug)]
 pub struct Checkerboard {
-    /// Colour of the square at the origin.
-    pub color0: Rgb,
+    /// Colour of the square at the origin; a texture here sees the surface's own coordinates, not those of the board.
+    pub color0: Texture,
     /// The other colour.
-    pub color1: Rgb,
-    /// Applied to the surface's coordinates before all else.
+    pub color1: Texture,
+    /// Applied to the surface's coordinates before the squares are counted.
     pub to_uv: Affine2,
 }
 
@@ -41,7 +41,7 @@ impl Texture {
         match self {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.eval(uv),
-            Texture::Checkerboard(c) => c.at(uv, [c.color0, c.color1]),
+            Texture::Checkerboard(c) => c.at(uv, [&c.color0, &c.color1]).eval(uv),
         }
     }
 
@@ -51,7 +51,7 @@ impl Texture {
     #[inline]
     pub fn eval_1(&self, uv: Vec2) -> f32 {
         match self {
-            Texture::Checkerboard(c) => c.at(uv, [c.color1, c.color0]).luminance(),
+            Texture::Checkerboard(c) => c.at(uv, [&c.color1, &c.color0]).eval_1(uv),
             _ => self.eval(uv).luminance(),
         }
     }
@@ -61,7 +61,7 @@ impl Texture {
         match self {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.texels.mean(),
-            Texture::Checkerboard(c) => c.color0.lerp(c.color1, 0.5),
+            Texture::Checkerboard(c) => c.color0.mean().lerp(c.color1.mean(), 0.5),
         }
     }
 
@@ -72,7 +72,7 @@ impl Texture {
             Texture::Constant(c) => of(*c),
             Texture::Bitmap(b) => b.texels.range(),
             Texture::Checkerboard(c) => {
-                let ((a, b), (c, d)) = (of(c.color0), of(c.color1));
+                let ((a, b), (c, d)) = (c.color0.range(), c.color1.range());
                 (a.min(c), b.max(d))
             }
         }
@@ -81,7 +81,7 @@ impl Texture {
 
 impl Checkerboard {
     #[inline]
-    fn at(&self, uv: Vec2, colors: [Rgb; 2]) -> Rgb {
+    fn at<'a>(&self, uv: Vec2, colors: [&'a Texture; 2]) -> &'a Texture {
         let p = self.to_uv.transform_point2(uv);
         let far = (p - p.floor()).cmpgt(Vec2::splat(0.5));
         colors[usize::from(far.x != far.y)]
@@ -115,7 +115,11 @@ mod tests {
         };
         let to_uv = if xml.contains("to_uv") { gold_to_uv() } else { Affine2::IDENTITY };
         if xml.contains("checkerboard") {
-            return Texture::Checkerboard(Box::new(Checkerboard { color0: rgb("color0", 0.4), color1: rgb("color1", 0.2), to_uv }));
+            return Texture::Checkerboard(Box::new(Checkerboard {
+                color0: Texture::Constant(rgb("color0", 0.4)),
+                color1: Texture::Constant(rgb("color1", 0.2)),
+                to_uv,
+            }));
         }
         let decoding = if value("raw") == Some("true") { Decoding::Raw } else { Decoding::Srgb };
         let texels = Arc::new(Texels::load(&folder().join(value("filename").unwrap()), decoding).unwrap());

@@ -1,5 +1,6 @@
 //! Shared by the test programs: scenes from text or file, independent runs, references.
 #![allow(dead_code, reason = "each test program uses its own part")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 use isophote::image::film::Film;
 use isophote::image::tiles::Reference;

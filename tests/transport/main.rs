@@ -1,4 +1,5 @@
 //! Whole methods on scenes whose answer is known.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,6 +1,7 @@
 //! Renders against stored references, over many seeds: minutes, not seconds. `.ci/run` runs them:
 //!
 //! `cargo test --release --test verification -- --ignored --nocapture --test-threads 1`
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -144,8 +144,8 @@ fn bitmap(builder: &mut Builder<'_>, plugin: &Plugin) -> Result<Texture> {
 
 fn checkerboard(builder: &mut Builder<'_>, plugin: &Plugin) -> Result<Texture> {
     // Mitsuba gives the colours no range of their own; whoever uses the texture checks it.
-    let color0 = builder.colour(plugin, "color0", 0.4, Role::Index)?;
-    let color1 = builder.colour(plugin, "color1", 0.2, Role::Index)?;
+    let color0 = builder.colour_or_texture(plugin, "color0", 0.4, Role::Index)?;
+    let color1 = builder.colour_or_texture(plugin, "color1", 0.2, Role::Index)?;
     Ok(Texture::Checkerboard(Box::new(Checkerboard { color0, color1, to_uv: to_uv(plugin)? })))
 }
 

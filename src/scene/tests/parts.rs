@@ -89,7 +89,11 @@ fn a_scene_knows_what_it_holds() {
 
 #[test]
 fn a_lights_radiance_may_vary_over_it() {
-    let checks = Checkerboard { color0: Rgb::splat(4.0), color1: Rgb::new(0.0, 1.0, 2.0), to_uv: Affine2::from_scale(Vec2::new(3.0, 2.0)) };
+    let checks = Checkerboard {
+        color0: Texture::grey(4.0),
+        color1: Texture::Constant(Rgb::new(0.0, 1.0, 2.0)),
+        to_uv: Affine2::from_scale(Vec2::new(3.0, 2.0)),
+    };
     let scene = Scene::build(parts(square(), 0, Some(Texture::Checkerboard(Box::new(checks))), Vec::new())).unwrap();
     let (mut numbers, mut means) = (stream(1500), [Mean::default(), Mean::default(), Mean::default()]);
     for _ in 0..20_000 {

@@ -32,7 +32,7 @@ fn child<'a, 'b>(node: Node<'a, 'b>, name: &str) -> Option<Node<'a, 'b>> {
 fn texture(node: Node, name: &str, default: f32) -> Texture {
     let Some(n) = child(node, name) else { return Texture::grey(default) };
     if n.tag_name().name() == "texture" {
-        let checkerboard = Checkerboard { color0: Rgb::splat(0.4), color1: Rgb::splat(0.2), to_uv: Affine2::IDENTITY };
+        let checkerboard = Checkerboard { color0: Texture::grey(0.4), color1: Texture::grey(0.2), to_uv: Affine2::IDENTITY };
         return Texture::Checkerboard(Box::new(checkerboard));
     }
     Texture::Constant(rgb(n))
