@@ -59,7 +59,7 @@ impl Integrator for Path<'_> {
     }
 }
 
-/// Power heuristic with exponent 2 for one sample of each technique [VEACH (9.13)]: the weight of the technique whose density is `a`.
+/// Power heuristic with exponent 2 for one sample of each technique [VEACH 9.2]: the weight of the technique whose density is `a`.
 #[inline(always)]
 fn power_heuristic(a: f32, b: f32) -> f32 {
     // As a ratio: squares of large densities overflow.

@@ -281,7 +281,7 @@ fn split<S: Stream>(point: &SurfacePoint<'_>, threshold: f32, stream: &mut S) ->
 const NORMAL_COSINE: f32 = 0.5;
 
 /// What one photon inside the disk adds: `f flux |wi.n_s|/|wi.n_g|`. Photons arrive per geometric area, so the shading cosine enters as a
-/// ratio (theory C.5, [VEACH 5.3]).
+/// ratio ([VEACH 5.3]).
 fn merge(at: &SurfacePoint<'_>, photon: &Photon, threshold: f32) -> Rgb {
     let (n_g, n_s) = (at.end.n_g, at.frame.n);
     if photon.n_g.dot(n_g) < NORMAL_COSINE || !sides_agree(photon.wi, n_g, n_s) {

@@ -91,7 +91,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// The adjoint factor of shading normals, `|wi.n_s| |wo.n_g| / (|wi.n_g| |wo.n_s|)`, for a light-side walk that came along `wi` =
-    /// `given` and leaves along `wo` = `d`: the quotient of [VEACH (5.17)] to the plain `f |wo.n_s|`. 1 where the normals are one.
+    /// `given` and leaves along `wo` = `d`: the quotient of [VEACH 5.3]'s adjoint to the plain `f |wo.n_s|`. 1 where the normals are one.
     #[inline]
     pub fn adjoint(&self, d: Vec3) -> f32 {
         let (n_g, n_s) = (self.end.n_g, self.frame.n);

@@ -74,7 +74,7 @@ fn keys(text: &str) -> BTreeSet<String> {
     let comments = text.lines().filter(|line| line.trim_start().starts_with("//"));
     comments
         .flat_map(|line| line.split('[').skip(1))
-        .filter_map(|rest| rest.split(']').next())
+        .filter_map(|rest| rest.split([']', '\\']).next())
         .filter_map(|inside| inside.split([' ', ',', ';']).next())
         .filter(|word| is_key(word))
         .map(str::to_owned)
