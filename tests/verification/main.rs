@@ -103,7 +103,15 @@ fn path_on_feature_scenes() {
 fn sppm_extrapolates(name: &str, radii: [f64; 5], photons: u64, iterations: u64, seeds: u64) {
     let Some(expected) = shared_reference(name) else { return };
     let scene = load_file(&shared().unwrap().join("scenes").join(name).join("scene.xml"), Some(SIZE));
-    let kept = expected.kept(cut(name));
+    let mut kept = expected.kept(cut(name));
+    if name == "veach-bidir" {
+        // The foot of the glass egg: caustics seen through glass, which the reference's path tracer holds as a few fireflies. There it has
+        // 0.30 (red, mean of the seven brightest of these pixels), our own `path` with 60,000 samples a pixel 0.56, `sppm` 0.50 at half a
+        // footprint (docs/verification.md).
+        for i in (64..66).flat_map(|y| (51..57).map(move |x| y * 96 + x)) {
+            kept[i] = false;
+        }
+    }
     let images: Vec<Vec<Vec<Rgb>>> = radii
         .iter()
         .enumerate()
