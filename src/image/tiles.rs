@@ -1,4 +1,4 @@
-//! Do independent runs agree with a reference? Welch's t-test on the means of tiles ([WELCH47]), the family held by Šidák ([SIDAK67]).
+//! Do independent runs agree with a reference? Welch's t-test on the means of tiles (\[WELCH47\]), the family held by Šidák (\[SIDAK67\]).
 //!
 //! A run is one observation: pixels that share a photon map or a chain are correlated, so nothing smaller counts as independent.
 

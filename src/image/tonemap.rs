@@ -27,7 +27,7 @@ impl Exposure {
     }
 }
 
-/// The sRGB transfer curve [IEC61966-2-1], from linear `[0, 1]`; values outside are clamped, NaN is 0.
+/// The sRGB transfer curve \[IEC61966-2-1\], from linear `[0, 1]`; values outside are clamped, NaN is 0.
 pub fn srgb(linear: f32) -> f32 {
     let v = if linear.is_nan() { 0.0 } else { linear.clamp(0.0, 1.0) };
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }

@@ -1,6 +1,6 @@
 //! Stochastic progressive photon mapping: one measurement point a pixel an iteration, photons gathered around it.
 //!
-//! [HACHISUKA09] with the global radius schedule of [KNAUS11]: iterations are independent given their index. Every path is counted once:
+//! \[HACHISUKA09\] with the global radius schedule of \[KNAUS11\]: iterations are independent given their index. Every path is counted once:
 //! its first event on the camera's side at a lobe rougher than the threshold is the gather; a path without one is seen directly or
 //! through a smooth chain, and its emission is added here. The estimate is biased by the finite radius and consistent for alpha < 1.
 

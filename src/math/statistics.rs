@@ -4,7 +4,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
-/// Level of one of `tests` independent tests so that the family keeps `family` ([SIDAK67]).
+/// Level of one of `tests` independent tests so that the family keeps `family` (\[SIDAK67\]).
 pub fn sidak(family: f64, tests: usize) -> f64 {
     -((-family).ln_1p() / tests.max(1) as f64).exp_m1()
 }
@@ -38,7 +38,7 @@ impl Sample {
     }
 }
 
-/// Two-sided p-value that two means are equal, by Welch's t-test ([WELCH47]). Equal constants give 1, different constants 0.
+/// Two-sided p-value that two means are equal, by Welch's t-test (\[WELCH47\]). Equal constants give 1, different constants 0.
 pub fn welch(a: &Sample, b: &Sample) -> f64 {
     let variance = a.variance + b.variance;
     if variance <= 0.0 || !variance.is_finite() {

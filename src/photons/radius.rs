@@ -1,6 +1,6 @@
 //! The global radius schedule.
 
-/// Factor on the first iteration's radius: `(i+1)^((alpha-1)/2)`, `i = 0, 1, ...` the iteration's absolute index ([KNAUS11] in the
+/// Factor on the first iteration's radius: `(i+1)^((alpha-1)/2)`, `i = 0, 1, ...` the iteration's absolute index (\[KNAUS11\] in the
 /// closed form of the interface; alpha in (0, 1], 1 keeps the radius constant). It depends on the index alone, so that iterations may
 /// be rendered in any order.
 pub fn shrink(i: u64, alpha: f64) -> f64 {

@@ -21,7 +21,7 @@ pub struct CameraConnection {
     /// Squared distance to the lens.
     pub distance2: f32,
     /// Density per steradian of the camera's own rays through **one given pixel** in direction `-wo`: `D^2/cos^3`, `D` the image plane's
-    /// distance at which a pixel has unit area ([VCM-TR]). Also the importance of one pixel for this direction
+    /// distance at which a pixel has unit area (\[VCM-TR\]). Also the importance of one pixel for this direction
     /// over `cos` at the lens, so a splat weighs `throughput f pdf_pixel cos_surface / distance2 / N`.
     pub pdf_pixel: SolidAnglePdf,
 }
@@ -322,7 +322,7 @@ impl Camera {
         if cos > 0.0 { self.pdf_pixel_at(cos) } else { SolidAnglePdf(0.0) }
     }
 
-    /// `1/(A cos^3)`, with `A` the area of a pixel on the plane z = 1 ([VEACH 8.3], [VCM-TR]).
+    /// `1/(A cos^3)`, with `A` the area of a pixel on the plane z = 1 ([VEACH 8.3], \[VCM-TR\]).
     fn pdf_pixel_at(&self, cos: f32) -> SolidAnglePdf {
         SolidAnglePdf(1.0 / (self.pixel_area * cos * cos * cos))
     }

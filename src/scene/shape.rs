@@ -1,6 +1,6 @@
 //! Shapes as a scene describes them: triangle meshes and analytic quadrics.
 //!
-//! What a ray meets is worked out in [`surface`]; this is the description that [`super::Scene::build`] consumes.
+//! What a ray meets is worked out in `surface`; this is the description that [`super::Scene::build`] consumes.
 
 mod mesh;
 mod quadric;

@@ -47,7 +47,7 @@ impl LightPathSpace for LightPaths<'_> {
     type Path = LightPath;
 
     /// Coordinates: one for the choice of emitter, two for the position, two for the direction, then those of
-    /// [`walk`](crate::transport::walk::walk).
+    /// [`walk`].
     fn trace<S: Stream>(&self, stream: &mut S, path: &mut LightPath) {
         path.vertices.clear();
         path.tally = Tally::default();

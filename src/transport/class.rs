@@ -1,4 +1,4 @@
-//! Path classes in Heckbert's letters [HECKBERT90]: `L` the light, `D` a diffuse event, `G` a glossy one, `S` a delta, `E` the eye.
+//! Path classes in Heckbert's letters \[HECKBERT90\]: `L` the light, `D` a diffuse event, `G` a glossy one, `S` a delta, `E` the eye.
 
 use regex::Regex;
 

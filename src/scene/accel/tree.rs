@@ -1,6 +1,6 @@
 //! From a binary tree to the eight-wide one.
 //!
-//! [YLITIE] H. Ylitie, T. Karras, S. Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs.
+//! \[YLITIE\] H. Ylitie, T. Karras, S. Laine: Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs.
 //! HPG 2017. Which binary nodes become wide ones, and which subtrees one leaf, is the choice of least expected cost.
 
 use super::Bounds;

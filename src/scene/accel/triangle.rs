@@ -1,6 +1,6 @@
 //! Four triangles side by side, tested without cracks between neighbours.
 //!
-//! [WOOP] S. Woop, C. Benthin, I. Wald: Watertight Ray/Triangle Intersection. JCGT 2(1), 2013.
+//! \[WOOP\] S. Woop, C. Benthin, I. Wald: Watertight Ray/Triangle Intersection. JCGT 2(1), 2013.
 
 use super::node::fetch;
 use super::probe::Probe;

@@ -118,7 +118,7 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
     }
 }
 
-/// Letters to insert, drop, replace or swap with their neighbour ([DAMERAU64], restricted: no letter takes part twice).
+/// Letters to insert, drop, replace or swap with their neighbour (\[DAMERAU64\], restricted: no letter takes part twice).
 fn edit_distance(a: &str, b: &str) -> usize {
     // Names longer than this are no slip of the hand, and the cost is quadratic.
     const LONGEST: usize = 64;

@@ -1,6 +1,6 @@
 //! Mitsuba 3 scene files: a documented subset, each parameter with Mitsuba's default and meaning (`docs/scenes.md`).
 //!
-//! Two stages. [`xml`] reads the files to a tree of plugins whose parameters remember whether they were read; [`build`] makes a
+//! Two stages. `xml` reads the files to a tree of plugins whose parameters remember whether they were read; `build` makes a
 //! [`Scene`] of the tree, through one small table a kind. A parameter nobody read is an error, or a note where it cannot change the
 //! image. Adding a plugin is its constructor and one line of its kind's table.
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-/// Unit vertex normals: the faces' unit normals weighted by their angle at the vertex ([TW98]), as Mitsuba computes them; and the number of
+/// Unit vertex normals: the faces' unit normals weighted by their angle at the vertex (\[TW98\]), as Mitsuba computes them; and the number of
 /// vertices where they cancel, which take the normal of one of their faces. A vertex without a face gets +z.
 pub(super) fn angle_weighted(positions: &[Vec3], triangles: &[[u32; 3]]) -> (Vec<Vec3>, usize) {
     let mut sums = vec![DVec3::ZERO; positions.len()];

@@ -38,7 +38,7 @@ pub(super) fn scene(shapes: Vec<(Geometry, Option<Rgb>)>, emitters: Vec<Emitter>
     .unwrap()
 }
 
-/// Level of one of `tests` tests for a family-wise level of one in a thousand ([SIDAK67]).
+/// Level of one of `tests` tests for a family-wise level of one in a thousand (\[SIDAK67\]).
 fn level(tests: usize) -> f64 {
     1.0 - 0.999f64.powf(1.0 / tests as f64)
 }
