@@ -29,7 +29,9 @@ impl Endpoint {
         let moved = self.p + away;
         // Rounding the sum must not undo the offset: step on, away from the surface, by one or two units in the last place
         // ([PBRT 6.8.6]). A sum that is zero or subnormal is exact and stays.
-        let step = |o: f32, a: f32| if a == 0.0 { o } else { o + (o.abs() * f32::EPSILON).copysign(a) };
+        // Masked, not chosen: which components of a normal vanish cannot be predicted.
+        let mask = |a: f32| 0u32.wrapping_sub(u32::from(a != 0.0));
+        let step = |o: f32, a: f32| o + f32::from_bits((o.abs() * f32::EPSILON).copysign(a).to_bits() & mask(a));
         Vec3::new(step(moved.x, away.x), step(moved.y, away.y), step(moved.z, away.z))
     }
 

@@ -119,7 +119,7 @@ impl Area {
         let to_light = point.end.p - from;
         let distance2 = to_light.length_squared();
         let distance = distance2.sqrt();
-        let wi = to_light / distance;
+        let wi = to_light * (1.0 / distance);
         let cos_light = emission_cosine(point.end.n_g, point.n_s, -wi)?;
         let pdf = AreaPdf(1.0 / self.area).to_solid_angle(cos_light, distance2);
         Some(AreaSample { end: point.end, wi, distance, cos_light, radiance: self.radiance.eval(point.uv), pdf })
