@@ -99,7 +99,8 @@ impl Path<'_> {
             let hit = scene.intersect(&ray);
             let emitted = match &hit {
                 Some(hit) if hit.emitter.is_none() => None,
-                Some(hit) => Some(scene.emitted(hit, -ray.d, from)),
+                // A copy: what is lent out must lie in memory, and few hits shine.
+                Some(hit) => Some(scene.emitted(&{ *hit }, -ray.d, from)),
                 None => Some(scene.escaped(ray.d)),
             };
             if let Some(emitted) = emitted

@@ -42,7 +42,7 @@ impl Discrete {
     }
 
     /// Draws; `u` in [0, 1).
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, u: f32) -> Choice {
         sample(&self.cumulative, u)
     }
@@ -78,9 +78,12 @@ fn append(cumulative: &mut Vec<u32>, weights: impl Iterator<Item = f64> + Clone)
     Some(total)
 }
 
-#[inline]
+#[inline(always)]
 fn sample(cumulative: &[u32], u: f32) -> Choice {
     let last = cumulative.len() - 1;
+    if last == 1 {
+        return Choice { index: 0, probability: 1.0, rest: u };
+    }
     let total = cumulative[last];
     let x = f64::from(u) * f64::from(total);
     let whole = (x as u32).min(total - 1);

@@ -15,7 +15,7 @@ pub struct Frame {
 
 impl Frame {
     /// Any frame around a unit normal, continuous but at `n.z = 0` sign changes (Duff et al. 2017).
-    #[inline]
+    #[inline(always)]
     pub fn from_normal(n: Vec3) -> Self {
         let sign = 1.0f32.copysign(n.z);
         let a = -1.0 / (sign + n.z);

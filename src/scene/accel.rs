@@ -76,9 +76,11 @@ pub struct Bvh {
     reach: f32,
     bounds: Option<Bounds>,
     primitives: usize,
+    /// Larger than the cache nearest to the processor, so that a walk had better ask for memory ahead.
+    large: bool,
 }
 
-/// Stack entries of a walk: a million triangles need about 80, and `build` sees to it that no tree needs more.
+/// Stack entries of a walk, a power of two: a million triangles need about 80, and `build` sees to it that no tree needs more.
 const DEEP: usize = 512;
 
 impl Bvh {

@@ -23,32 +23,26 @@ impl Endpoint {
     }
 
     /// The position moved off its surface to the side that `d` points to.
-    #[inline]
+    #[inline(always)]
     pub fn toward(&self, d: Vec3) -> Vec3 {
-        let side = self.offset.copysign(d.dot(self.n_g));
-        let moved = self.p + self.n_g * side;
-        // Rounding the sum must not undo the offset: step to the next number away from the surface ([PBRT 6.8.6]).
-        let away = self.n_g * side;
-        let step = |o: f32, a: f32| {
-            if a > 0.0 {
-                o.next_up()
-            } else if a < 0.0 {
-                o.next_down()
-            } else {
-                o
-            }
-        };
+        let away = self.n_g * self.offset.copysign(d.dot(self.n_g));
+        let moved = self.p + away;
+        // Rounding the sum must not undo the offset: step on, away from the surface, by one or two units in the last place
+        // ([PBRT 6.8.6]). A sum that is zero or subnormal is exact and stays.
+        // Masked, not chosen: which components of a normal vanish cannot be predicted.
+        let mask = |a: f32| 0u32.wrapping_sub(u32::from(a != 0.0));
+        let step = |o: f32, a: f32| o + f32::from_bits((o.abs() * f32::EPSILON).copysign(a).to_bits() & mask(a));
         Vec3::new(step(moved.x, away.x), step(moved.y, away.y), step(moved.z, away.z))
     }
 
     /// The endless ray that leaves along `d`.
-    #[inline]
+    #[inline(always)]
     pub fn ray(&self, d: Vec3) -> Ray {
         Ray::new(self.toward(d), d)
     }
 
     /// The ray that ends just before `other`; its direction has the length of the segment.
-    #[inline]
+    #[inline(always)]
     pub fn segment(&self, other: &Endpoint) -> Ray {
         let o = self.toward(other.p - self.p);
         let end = other.toward(self.p - other.p);

@@ -170,13 +170,13 @@ impl Scene {
     }
 
     /// The closest hit.
-    #[inline]
+    #[inline(always)]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.tree.closest(ray).map(|raw| self.surfaces.hit(ray, &raw))
     }
 
     /// Is anything between two points?
-    #[inline]
+    #[inline(always)]
     pub fn occluded(&self, a: &Endpoint, b: &Endpoint) -> bool {
         let segment = a.segment(b);
         segment.d != Vec3::ZERO && self.tree.occluded(&segment)
@@ -189,7 +189,7 @@ impl Scene {
     }
 
     /// Can the point `from` see a light sample?
-    #[inline]
+    #[inline(always)]
     pub fn visible(&self, from: &Endpoint, sample: &DirectSample) -> bool {
         match sample.kind {
             EmitterKind::Surface | EmitterKind::DeltaPosition => !self.occluded(from, &sample.end),
@@ -205,7 +205,7 @@ impl Scene {
 
     /// A light sample as seen from `from`, emitters chosen by power; `u_pick` chooses the emitter, `u` the point on it. `None` if the light
     /// chosen sends nothing there: an estimate of zero.
-    #[inline]
+    #[inline(always)]
     pub fn sample_direct(&self, from: Vec3, u_pick: f32, u: Vec2) -> Option<DirectSample> {
         self.emitters.sample_direct(&self.surfaces, from, u_pick, u)
     }
@@ -219,7 +219,7 @@ impl Scene {
     /// What `hit` emits along `wo` (unit, away from the surface) towards `from`, the point it was seen from; black if it does not shine there.
     #[inline]
     pub fn emitted(&self, hit: &Hit, wo: Vec3, from: Vec3) -> Emitted {
-        self.emitters.emitted(&self.surfaces, hit, wo, from)
+        self.emitters.emitted(hit, wo, from)
     }
 
     /// What arrives from infinity along a ray of unit direction `d` that left the scene.
@@ -268,7 +268,7 @@ impl Scene {
     }
 
     /// The material of a shape.
-    #[inline]
+    #[inline(always)]
     pub fn bsdf(&self, shape: ShapeId) -> &Bsdf {
         &self.bsdfs[self.surfaces.bsdf(shape).0 as usize]
     }

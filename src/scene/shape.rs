@@ -3,7 +3,7 @@
 //! What a ray meets is worked out in `surface`; this is the description that [`super::Scene::build`] consumes.
 
 mod mesh;
-mod quadric;
+pub(in crate::scene) mod quadric;
 pub(super) mod surface;
 
 pub use mesh::Mesh;

@@ -36,8 +36,20 @@ impl Texture {
     }
 
     /// Value at texture coordinates `uv` (any real numbers).
-    #[inline]
+    #[inline(always)]
     pub fn eval(&self, uv: Vec2) -> Rgb {
+        match self {
+            Texture::Constant(c) => *c,
+            _ => {
+                let c = self.varying(uv);
+                Rgb::new(c.r(), c.g(), c.b())
+            }
+        }
+    }
+
+    /// [`Texture::eval`] out of line.
+    #[inline(never)]
+    fn varying(&self, uv: Vec2) -> Rgb {
         match self {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.eval(uv),

@@ -52,7 +52,7 @@ pub struct SurfacePoint<'a> {
 
 impl<'a> SurfacePoint<'a> {
     /// At a hit, for a ray that travelled along `d`. `None` where the sides of `-d` disagree: nothing scatters there.
-    #[inline]
+    #[inline(always)]
     pub fn new(hit: &Hit, bsdf: &'a Bsdf, d: Vec3) -> Option<Self> {
         let given = -d;
         sides_agree(given, hit.end.n_g, hit.frame.n).then(|| Self {
@@ -67,7 +67,7 @@ impl<'a> SurfacePoint<'a> {
 
     /// `f(wi -> wo)` towards the world direction `w` and the density of `w`, over the lobes asked for and without any cosine; black
     /// where the sides of `w` disagree.
-    #[inline]
+    #[inline(always)]
     pub fn eval_pdf(&self, w: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
         if !sides_agree(w, self.end.n_g, self.frame.n) {
             return (Rgb::BLACK, 0.0);
@@ -76,7 +76,7 @@ impl<'a> SurfacePoint<'a> {
     }
 
     /// A next direction. `None` where the walk ends: absorbed, or the sides of the sampled direction disagree.
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<Scattered> {
         let s = self.bsdf.sample(self.uv, self.given_local, mode, lobes, u_lobe, u)?;
         let d = self.frame.to_world(s.w);

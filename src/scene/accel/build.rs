@@ -10,6 +10,9 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+/// Bytes of a tree that a processor's second cache holds, with room for what else a renderer touches.
+const NEAR_CACHE: usize = 256 << 10;
+
 pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     let mut items = Vec::with_capacity(primitives.len());
     let mut boxes = Vec::with_capacity(primitives.len());
@@ -35,13 +38,23 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     }
     analytic.shrink_to_fit();
     let Some(all) = boxes.iter().copied().reduce(union) else {
-        return Bvh { nodes: Vec::new(), triangles: Vec::new(), analytic, root: EMPTY, reach: 0.0, bounds: None, primitives: 0 };
+        return Bvh {
+            nodes: Vec::new(),
+            triangles: Vec::new(),
+            analytic,
+            root: EMPTY,
+            reach: 0.0,
+            bounds: None,
+            primitives: 0,
+            large: false,
+        };
     };
     let mut wide = by_area(&boxes).widen(&items);
     if wide.stack > DEEP {
         // Only a degenerate list gets here; a balanced tree over 2^30 items is 30 deep at most, and 7 * 30 < DEEP.
         wide = by_halves(&boxes).widen(&items);
     }
+    let large = size_of_val(&wide.nodes[..]) + size_of_val(&wide.triangles[..]) > NEAR_CACHE;
     let reach = all.min.abs().max(all.max.abs());
     Bvh {
         nodes: wide.nodes,
@@ -51,6 +64,7 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
         reach: reach.x.max(reach.y).max(reach.z),
         bounds: Some(all),
         primitives: items.len(),
+        large,
     }
 }
 

@@ -50,14 +50,16 @@ impl Node {
     #[inline(always)]
     pub(super) fn meet(&self, p: &Probe, t_max: f32) -> (u32, f32x8) {
         let [i, j, k] = p.enters;
-        let enter = (self.x[i & 1].mul_add(p.inv[0], p.near[0]))
-            .fast_max(self.y[j & 1].mul_add(p.inv[1], p.near[1]))
-            .fast_max(self.z[k & 1].mul_add(p.inv[2], p.near[2]))
+        let spread = f32x8::splat;
+        let (x, y, z) = (spread(p.inv[0]), spread(p.inv[1]), spread(p.inv[2]));
+        let enter = (self.x[i & 1].mul_add(x, spread(p.near[0])))
+            .fast_max(self.y[j & 1].mul_add(y, spread(p.near[1])))
+            .fast_max(self.z[k & 1].mul_add(z, spread(p.near[2])))
             .fast_max(f32x8::ZERO);
-        let leave = (self.x[!i & 1].mul_add(p.inv[0], p.far[0]))
-            .fast_min(self.y[!j & 1].mul_add(p.inv[1], p.far[1]))
-            .fast_min(self.z[!k & 1].mul_add(p.inv[2], p.far[2]))
-            .fast_min(f32x8::splat(t_max));
+        let leave = (self.x[!i & 1].mul_add(x, spread(p.far[0])))
+            .fast_min(self.y[!j & 1].mul_add(y, spread(p.far[1])))
+            .fast_min(self.z[!k & 1].mul_add(z, spread(p.far[2])))
+            .fast_min(spread(t_max));
         (enter.simd_le(leave).to_bitmask(), enter)
     }
 }

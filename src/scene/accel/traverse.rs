@@ -17,10 +17,20 @@ fn entry(t: f32, child: u32) -> u64 {
     u64::from(t.to_bits()) << 32 | u64::from(child)
 }
 
+/// The probe as something that must be loaded anew: the compiler would otherwise hold all of it in registers from step to step, where
+/// boxes and triangles leave no room, and every leaf would put it away and fetch it back.
+#[inline(always)]
+fn in_memory(p: &Probe) -> &Probe {
+    std::hint::black_box(p)
+}
+
 impl Bvh {
     /// Starts fetching a child that will be visited soon.
     #[inline(always)]
     fn fetch(&self, child: u32) {
+        if !self.large {
+            return;
+        }
         if child & LEAF == 0 {
             if let Some(node) = self.nodes.get(child as usize) {
                 node.fetch();
@@ -46,9 +56,10 @@ impl Bvh {
             return None;
         }
         loop {
+            let p = in_memory(&p);
             if at & LEAF == 0 {
                 let node = &self.nodes[at as usize];
-                let (mut mask, enter) = node.meet(&p, best.t);
+                let (mut mask, enter) = node.meet(p, best.t);
                 if mask != 0 {
                     let enter = enter.as_array();
                     let i = mask.trailing_zeros() as usize & 7;
@@ -63,7 +74,7 @@ impl Bvh {
                     self.fetch(node.child[i]);
                     self.fetch(node.child[j]);
                     let mut nearest = a.min(b);
-                    stack[top].set(a.max(b));
+                    stack[top & (DEEP - 1)].set(a.max(b));
                     let base = top;
                     top += 1;
                     while mask != 0 {
@@ -85,17 +96,17 @@ impl Bvh {
                     continue;
                 }
             } else if at & ANALYTIC == 0 {
-                self.triangles[(at & !LEAF) as usize].closest(&p, &mut best);
+                self.triangles[(at & !LEAF) as usize].closest(p, &mut best);
             } else {
-                self.analytic[(at & !(LEAF | ANALYTIC)) as usize].closest(&p, &mut best);
+                self.analytic[(at & !(LEAF | ANALYTIC)) as usize].closest(p, &mut best);
             }
             // A child entered no sooner than the best hit is not worth opening; equally near ones are, for the tie.
             loop {
                 if top == 0 {
-                    return self.report(&p, ray, best);
+                    return self.report(p, ray, best);
                 }
                 top -= 1;
-                let next = stack[top].get();
+                let next = stack[top & (DEEP - 1)].get();
                 if f32::from_bits((next >> 32) as u32) <= best.t {
                     at = next as u32;
                     break;
@@ -129,9 +140,10 @@ impl Bvh {
             return false;
         }
         loop {
+            let p = in_memory(&p);
             if at & LEAF == 0 {
                 let node = &self.nodes[at as usize];
-                let (mut mask, _) = node.meet(&p, t_max);
+                let (mut mask, _) = node.meet(p, t_max);
                 if mask != 0 {
                     loop {
                         at = node.child[mask.trailing_zeros() as usize & 7];
@@ -140,23 +152,23 @@ impl Bvh {
                         if mask == 0 {
                             break;
                         }
-                        stack[top].set(u64::from(at));
+                        stack[top & (DEEP - 1)].set(u64::from(at));
                         top += 1;
                     }
                     continue;
                 }
             } else if at & ANALYTIC == 0 {
-                if self.triangles[(at & !LEAF) as usize].occluded(&p, t_max) {
+                if self.triangles[(at & !LEAF) as usize].occluded(p, t_max) {
                     return true;
                 }
-            } else if self.analytic[(at & !(LEAF | ANALYTIC)) as usize].occluded(&p, t_max) {
+            } else if self.analytic[(at & !(LEAF | ANALYTIC)) as usize].occluded(p, t_max) {
                 return true;
             }
             if top == 0 {
                 return false;
             }
             top -= 1;
-            at = stack[top].get() as u32;
+            at = stack[top & (DEEP - 1)].get() as u32;
         }
     }
 }

@@ -62,10 +62,12 @@ impl Tri4 {
         let [x, y, z] = p.axis.map(|k| k & 3);
         // Corners relative to the origin, sheared so that the ray is the z axis. Neighbours share corners, not edges:
         // the same corner gives the same numbers in both.
+        let minus_o = p.minus_origin.map(f32x4::splat);
+        let (shear_x, shear_y) = (f32x4::splat(p.shear_x), f32x4::splat(p.shear_y));
         let moved = |c: &[f32x4; 4]| {
-            let z = c[z] - p.origin[2];
-            let x = p.shear[0].mul_neg_add(z, c[x] - p.origin[0]);
-            let y = p.shear[1].mul_neg_add(z, c[y] - p.origin[1]);
+            let z = c[z] + minus_o[2];
+            let x = shear_x.mul_neg_add(z, c[x] + minus_o[0]);
+            let y = shear_y.mul_neg_add(z, c[y] + minus_o[1]);
             (x, y, z)
         };
         let (ax, ay, az) = moved(&self.corner[0]);
@@ -85,7 +87,7 @@ impl Tri4 {
         let scale = f32x4::ONE / (a + b + c);
         let (w, u, v) = (a * scale, b * scale, c * scale);
         let depth = w * az + u * bz + v * cz;
-        let t = depth * p.inv_z;
+        let t = depth * f32x4::splat(p.inv_z);
         // Where the depth is below its own error: that of a weight, times the corners' depth.
         let most = |a: f32x4, b: f32x4, c: f32x4| a.abs().fast_max(b.abs()).fast_max(c.abs());
         let deep = most(az, bz, cz);
@@ -110,7 +112,7 @@ impl Tri4 {
             mask &= mask - 1;
             let mut t = four.t[lane];
             if four.doubtful >> lane & 1 != 0 {
-                t = self.exactly(p, lane, t);
+                t = self.exactly(p.o, p.d, lane, t);
                 if t.is_nan() || t <= 0.0 {
                     continue;
                 }
@@ -129,7 +131,7 @@ impl Tri4 {
         }
         (0..4).any(|lane| {
             mask >> lane & 1 != 0 && {
-                let t = self.exactly(p, lane, four.t[lane]);
+                let t = self.exactly(p.o, p.d, lane, four.t[lane]);
                 t > 0.0 && t <= t_max
             }
         })
@@ -156,13 +158,13 @@ impl Tri4 {
     /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
     #[cold]
     #[inline(never)]
-    fn exactly(&self, p: &Probe, lane: usize, t: f32) -> f32 {
+    fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
         let a = self.at(0, lane);
         let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
-        let along = n.dot(p.d.as_dvec3());
+        let along = n.dot(d.as_dvec3());
         if along == 0.0 {
             return t;
         }
-        (n.dot(a - p.o.as_dvec3()) / along) as f32
+        (n.dot(a - o.as_dvec3()) / along) as f32
     }
 }

@@ -14,6 +14,7 @@ pub struct Diffuse {
 }
 
 impl Diffuse {
+    #[inline(always)]
     pub(super) fn eval(&self, uv: Vec2, wi: Vec3, wo: Vec3, lobes: Lobes) -> Rgb {
         if wi.z <= 0.0 || wo.z <= 0.0 || !lobes.admit(1.0) {
             return Rgb::BLACK;
@@ -21,6 +22,7 @@ impl Diffuse {
         self.reflectance.eval(uv) * FRAC_1_PI
     }
 
+    #[inline(always)]
     pub(super) fn pdf(&self, _uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
         if given.z <= 0.0 || sampled.z <= 0.0 || !lobes.admit(1.0) {
             return 0.0;
@@ -28,6 +30,7 @@ impl Diffuse {
         warp::cosine_hemisphere_pdf(sampled.z).0
     }
 
+    #[inline(always)]
     pub(super) fn sample(&self, uv: Vec2, given: Vec3, _mode: Mode, lobes: Lobes, _u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         if given.z <= 0.0 || !lobes.admit(1.0) {
             return None;
@@ -48,7 +51,7 @@ impl Diffuse {
         if given.z <= 0.0 || !lobes.admit(1.0) { 0.0 } else { self.reflectance.eval(uv).mean() }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, _mode: Mode, lobes: Lobes) -> (Rgb, f32) {
         (self.eval(uv, sampled, given, lobes), self.pdf(uv, given, sampled, lobes))
     }
@@ -58,6 +61,7 @@ impl Diffuse {
         lobes.admit(1.0)
     }
 
+    #[inline(always)]
     pub(super) fn max_roughness(&self) -> f32 {
         1.0
     }

@@ -144,15 +144,41 @@ impl Bsdf {
     }
 
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, for a walk in `mode`: what next event estimation asks.
-    #[inline]
+    #[inline(always)]
     pub fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        match self {
+            Bsdf::Diffuse(b) => b.eval_pdf(uv, given, sampled, mode, lobes),
+            _ => {
+                let (f, pdf) = self.eval_pdf_any(uv, given, sampled, mode, lobes);
+                (f, pdf)
+            }
+        }
+    }
+
+    /// [`Bsdf::eval_pdf`] out of line: the commonest material is worth a place in every loop, all of them are not.
+    #[inline(never)]
+    fn eval_pdf_any(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
         dispatch!(self, b => b.eval_pdf(uv, given, sampled, mode, lobes))
     }
 
     /// A direction drawn from the lobes asked for, deltas included; `None` where the walk ends (absorbed, or below the surface).
     /// `u_lobe` chooses the lobe, `u` the direction; each coordinate is in [0, 1).
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        match self {
+            Bsdf::Diffuse(b) => b.sample(uv, given, mode, lobes, u_lobe, u),
+            _ => {
+                // Part by part, so that the result of the case above need not go through the memory that this call writes to.
+                let BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta } =
+                    self.sample_any(uv, given, mode, lobes, u_lobe, u)?;
+                Some(BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta })
+            }
+        }
+    }
+
+    /// [`Bsdf::sample`] out of line.
+    #[inline(never)]
+    fn sample_any(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         dispatch!(self, b => b.sample(uv, given, mode, lobes, u_lobe, u))
     }
 
@@ -170,7 +196,17 @@ impl Bsdf {
     }
 
     /// Roughness of the roughest lobe there is anywhere on the surface; 0 if all are deltas.
+    #[inline(always)]
     pub fn max_roughness(&self) -> f32 {
+        match self {
+            Bsdf::Diffuse(b) => b.max_roughness(),
+            _ => self.max_roughness_any(),
+        }
+    }
+
+    /// [`Bsdf::max_roughness`] out of line.
+    #[inline(never)]
+    fn max_roughness_any(&self) -> f32 {
         dispatch!(self, b => b.max_roughness())
     }
 

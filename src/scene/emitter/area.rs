@@ -5,6 +5,7 @@ use crate::math::distribution::Discrete;
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, warp};
 use crate::scene::ShapeId;
 use crate::scene::hit::Endpoint;
+use crate::scene::shape::quadric::Quadric;
 use crate::scene::shape::surface::{SurfacePoint, Surfaces};
 use crate::scene::texture::Texture;
 use glam::{DVec3, Vec2, Vec3};
@@ -23,6 +24,8 @@ pub struct Area {
     choice: Option<Discrete>,
     /// Area of the shape, world units squared.
     area: f32,
+    /// Centre and radius, if it is a sphere that shines outwards.
+    sphere: Option<(DVec3, f64)>,
 }
 
 /// A light sample on a surface, the choice of emitter not included.
@@ -43,7 +46,8 @@ impl Area {
     pub(in crate::scene) fn new(shape: ShapeId, radiance: Texture, primitives: Range<usize>, surfaces: &Surfaces) -> Self {
         let area: f64 = primitives.clone().map(|i| surfaces.area(i)).sum();
         let choice = if primitives.len() > 1 { Discrete::new(primitives.clone().map(|i| surfaces.area(i))) } else { None };
-        Self { shape, radiance, first: primitives.start, choice, area: area as f32 }
+        let sphere = if primitives.len() == 1 { surfaces.as_quadric(primitives.start).and_then(Quadric::outward_sphere) } else { None };
+        Self { shape, radiance, first: primitives.start, choice, area: area as f32, sphere }
     }
 
     /// The shape that shines.
@@ -81,7 +85,7 @@ impl Area {
     }
 
     /// A point, uniform by area.
-    #[inline]
+    #[inline(always)]
     fn sample_position(&self, surfaces: &Surfaces, u_primitive: f32, u: Vec2) -> SurfacePoint {
         let index = self.choice.as_ref().map_or(0, |choice| choice.sample(u_primitive).index);
         surfaces.sample(self.first + index, u)
@@ -89,29 +93,33 @@ impl Area {
 
     /// A sphere seen from outside fills a cone, which is sampled instead of its area.
     #[inline]
-    fn cone(&self, surfaces: &Surfaces, from: Vec3) -> Option<Cone> {
-        if self.choice.is_some() {
-            return None;
-        }
-        let (center, radius) = surfaces.as_quadric(self.first)?.outward_sphere()?;
+    fn cone(&self, from: Vec3) -> Option<Cone> {
+        let (center, radius) = self.sphere?;
         Cone::new(from, center, radius)
     }
 
-    #[inline]
+    #[inline(never)]
+    fn sample_cone(&self, cone: &Cone, surfaces: &Surfaces, from: Vec3, u: Vec2) -> Option<AreaSample> {
+        let quadric = surfaces.as_quadric(self.first)?;
+        let (outward, wi, cos_light) = cone.sample(u);
+        let point = quadric.in_direction(outward);
+        let distance = point.end.p.distance(from);
+        let radiance = self.radiance.eval(point.uv);
+        (cos_light > 0.0).then_some(AreaSample { end: point.end, wi, distance, cos_light, radiance, pdf: cone.pdf() })
+    }
+
+    #[inline(always)]
     pub(super) fn sample_direct(&self, surfaces: &Surfaces, from: Vec3, u_primitive: f32, u: Vec2) -> Option<AreaSample> {
-        if let Some(cone) = self.cone(surfaces, from) {
-            let quadric = surfaces.as_quadric(self.first)?;
-            let (outward, wi, cos_light) = cone.sample(u);
-            let point = quadric.in_direction(outward);
-            let distance = point.end.p.distance(from);
-            let radiance = self.radiance.eval(point.uv);
-            return (cos_light > 0.0).then_some(AreaSample { end: point.end, wi, distance, cos_light, radiance, pdf: cone.pdf() });
+        if let Some(cone) = self.cone(from) {
+            let AreaSample { end: Endpoint { p, n_g, offset }, wi, distance, cos_light, radiance, pdf } =
+                self.sample_cone(&cone, surfaces, from, u)?;
+            return Some(AreaSample { end: Endpoint { p, n_g, offset }, wi, distance, cos_light, radiance, pdf });
         }
         let point = self.sample_position(surfaces, u_primitive, u);
         let to_light = point.end.p - from;
         let distance2 = to_light.length_squared();
         let distance = distance2.sqrt();
-        let wi = to_light / distance;
+        let wi = to_light * (1.0 / distance);
         let cos_light = emission_cosine(point.end.n_g, point.n_s, -wi)?;
         let pdf = AreaPdf(1.0 / self.area).to_solid_angle(cos_light, distance2);
         Some(AreaSample { end: point.end, wi, distance, cos_light, radiance: self.radiance.eval(point.uv), pdf })
@@ -119,11 +127,11 @@ impl Area {
 
     /// What a point of the shape emits along `wo` towards `from`; the choice of emitter is not included in the density.
     #[inline]
-    pub(super) fn emitted(&self, surfaces: &Surfaces, end: &Endpoint, n_s: Vec3, uv: Vec2, wo: Vec3, from: Vec3) -> Emitted {
+    pub(super) fn emitted(&self, end: &Endpoint, n_s: Vec3, uv: Vec2, wo: Vec3, from: Vec3) -> Emitted {
         let Some(cos_light) = emission_cosine(end.n_g, n_s, wo) else {
             return Emitted::default();
         };
-        let pdf_direct = match self.cone(surfaces, from) {
+        let pdf_direct = match self.cone(from) {
             Some(cone) => cone.pdf(),
             None => AreaPdf(1.0 / self.area).to_solid_angle(cos_light, end.p.distance_squared(from)),
         };

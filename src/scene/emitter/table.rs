@@ -127,16 +127,38 @@ impl Emitters {
         self.choice.as_ref().map_or(0.0, |choice| choice.probability(emitter.0 as usize))
     }
 
-    #[inline]
+    #[inline(always)]
     fn pick(&self, u: f32) -> Option<(EmitterId, &Emitter, Choice)> {
         let choice = self.choice.as_ref()?.sample(u);
         Some((EmitterId(choice.index as u32), &self.list[choice.index], choice))
     }
 
-    #[inline]
+    #[inline(always)]
     pub(in crate::scene) fn sample_direct(&self, surfaces: &Surfaces, from: Vec3, u_pick: f32, u: Vec2) -> Option<DirectSample> {
         let (id, emitter, choice) = self.pick(u_pick)?;
-        let pick = choice.probability;
+        let Emitter::Area(area) = emitter else {
+            let DirectSample { emitter, kind, wi, end, distance, cos_light, radiance, pdf } =
+                self.sample_no_surface(id, from, choice.probability, u)?;
+            let Endpoint { p, n_g, offset } = end;
+            return Some(DirectSample { emitter, kind, wi, end: Endpoint { p, n_g, offset }, distance, cos_light, radiance, pdf });
+        };
+        let s = area.sample_direct(surfaces, from, choice.rest, u)?;
+        Some(DirectSample {
+            emitter: id,
+            kind: EmitterKind::Surface,
+            wi: s.wi,
+            end: s.end,
+            distance: s.distance,
+            cos_light: s.cos_light,
+            radiance: s.radiance,
+            pdf: s.pdf * choice.probability,
+        })
+    }
+
+    /// A light sample on an emitter that has no surface, chosen with probability `pick`.
+    #[inline(never)]
+    fn sample_no_surface(&self, id: EmitterId, from: Vec3, pick: f32, u: Vec2) -> Option<DirectSample> {
+        let emitter = &self.list[id.0 as usize];
         let kind = emitter.kind();
         let infinite = |wi: Vec3, radiance: Rgb, pdf: SolidAnglePdf| DirectSample {
             emitter: id,
@@ -166,19 +188,7 @@ impl Emitters {
             })
         };
         match emitter {
-            Emitter::Area(a) => {
-                let s = a.sample_direct(surfaces, from, choice.rest, u)?;
-                Some(DirectSample {
-                    emitter: id,
-                    kind,
-                    wi: s.wi,
-                    end: s.end,
-                    distance: s.distance,
-                    cos_light: s.cos_light,
-                    radiance: s.radiance,
-                    pdf: s.pdf * pick,
-                })
-            }
+            Emitter::Area(_) => None,
             Emitter::Point(p) => delta(p.position, &|_| p.intensity),
             Emitter::Spot(s) => delta(s.position(), &|d| s.intensity(d)),
             Emitter::Directional(d) => Some(infinite(-d.direction(), d.irradiance, SolidAnglePdf(1.0))),
@@ -240,11 +250,11 @@ impl Emitters {
     }
 
     #[inline]
-    pub(in crate::scene) fn emitted(&self, surfaces: &Surfaces, hit: &Hit, wo: Vec3, from: Vec3) -> Emitted {
+    pub(in crate::scene) fn emitted(&self, hit: &Hit, wo: Vec3, from: Vec3) -> Emitted {
         let Some((id, Emitter::Area(a))) = hit.emitter.map(|id| (id, &self.list[id.0 as usize])) else {
             return Emitted::default();
         };
-        let mut emitted = a.emitted(surfaces, &hit.end, hit.frame.n, hit.uv, wo, from);
+        let mut emitted = a.emitted(&hit.end, hit.frame.n, hit.uv, wo, from);
         emitted.pdf_direct = emitted.pdf_direct * self.pick_probability(id);
         emitted
     }

@@ -167,20 +167,28 @@ impl Surfaces {
     }
 
     /// Works out the surface where `ray` met a primitive.
-    #[inline]
+    #[inline(always)]
     pub(in crate::scene) fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
         let record = &self.records[raw.prim as usize];
         let owner = &self.owners[record.shape as usize];
         let (point, frame) = if record.detail & KIND == QUADRIC {
-            let quadric = &self.quadrics[(record.detail & !KIND) as usize];
-            quadric.surface(ray.o.as_dvec3() + f64::from(raw.t) * ray.d.as_dvec3(), owner.tangents)
+            // Part by part, so that triangles' hits need not go through the memory that this call writes to.
+            let (SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv }, Frame { s, t, n }) =
+                self.on_quadric(record, ray, raw.t, owner.tangents);
+            (SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv }, Frame { s, t, n })
         } else {
             let point = self.point(record, raw.u, raw.v);
-            let frame =
-                if owner.tangents { Frame::from_normal_and_tangent(point.n_s, self.dp_du(record)) } else { Frame::from_normal(point.n_s) };
+            let Frame { s, t, n } = if owner.tangents { self.tangent_frame(record, point.n_s) } else { Frame::from_normal(point.n_s) };
+            let frame = Frame { s, t, n };
             (point, frame)
         };
         Hit { t: raw.t, end: point.end, frame, uv: point.uv, prim: raw.prim, shape: ShapeId(record.shape), emitter: owner.emitter }
+    }
+
+    /// The surface of a quadric where a ray met it.
+    #[inline(never)]
+    fn on_quadric(&self, record: &Record, ray: &Ray, t: f32, tangents: bool) -> (SurfacePoint, Frame) {
+        self.quadrics[(record.detail & !KIND) as usize].surface(ray.o.as_dvec3() + f64::from(t) * ray.d.as_dvec3(), tangents)
     }
 
     /// The point of a triangle with these weights of the second and third corner.
@@ -203,6 +211,12 @@ impl Surfaces {
             record.n_g
         };
         SurfacePoint { end, n_s, uv }
+    }
+
+    /// The frame of a triangle whose material wants tangents.
+    #[inline(never)]
+    fn tangent_frame(&self, record: &Record, n_s: Vec3) -> Frame {
+        Frame::from_normal_and_tangent(n_s, self.dp_du(record))
     }
 
     /// How a triangle's position moves with the first texture coordinate; the first edge where that is not defined, as Mitsuba has it.
@@ -229,14 +243,20 @@ impl Surfaces {
     }
 
     /// A point of a primitive, uniform by area; `u` in `[0, 1)^2`.
-    #[inline]
+    #[inline(always)]
     pub(in crate::scene) fn sample(&self, prim: usize, u: Vec2) -> SurfacePoint {
         let record = &self.records[prim];
         if record.detail & KIND == QUADRIC {
-            return self.quadrics[(record.detail & !KIND) as usize].sample(u);
+            let SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv } = self.sample_quadric(record, u);
+            return SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv };
         }
         let b = warp::triangle(u);
         self.point(record, b.x, b.y)
+    }
+
+    #[inline(never)]
+    fn sample_quadric(&self, record: &Record, u: Vec2) -> SurfacePoint {
+        self.quadrics[(record.detail & !KIND) as usize].sample(u)
     }
 
     /// The sphere that a primitive is, if it is one.
