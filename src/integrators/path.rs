@@ -47,12 +47,7 @@ impl Integrator for Path<'_> {
                 None => self.radiance::<_, false>(x, y, &mut stream, tally),
                 Some(_) => self.radiance::<_, true>(x, y, &mut stream, tally),
             };
-            if value.is_finite() {
-                value
-            } else {
-                tally.non_finite += 1;
-                Rgb::BLACK
-            }
+            tally.finite(value)
         };
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
         stats

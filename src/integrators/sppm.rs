@@ -236,12 +236,7 @@ impl Integrator for Sppm<'_> {
             let position = Vec2::new(x as f32, y as f32) + jitter;
             let (emission, measured) = self.measure(position, lens, &mut stream, tally);
             let value = emission + measured.map_or(Rgb::BLACK, |m| self.gather(&m, radius, &grid, &scales));
-            if value.is_finite() {
-                value
-            } else {
-                tally.non_finite += 1;
-                Rgb::BLACK
-            }
+            tally.finite(value)
         };
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
         stats.camera_paths += (self.size.0 * self.size.1) as u64;

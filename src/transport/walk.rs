@@ -21,6 +21,16 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// The contribution itself, or nothing, counted, if it is not finite.
+    #[inline]
+    pub fn finite(&mut self, contribution: Rgb) -> Rgb {
+        if contribution.is_finite() {
+            return contribution;
+        }
+        self.non_finite += 1;
+        Rgb::BLACK
+    }
+
     /// Adds another's counts.
     pub fn add(&mut self, other: &Tally) {
         self.rays += other.rays;
