@@ -106,7 +106,7 @@ fn sppm_extrapolates(name: &str, radii: [f64; 5], photons: u64, iterations: u64,
     let mut kept = expected.kept(cut(name));
     if name == "veach-bidir" {
         // The foot of the glass egg: caustics seen through glass, which the reference's path tracer holds as a few fireflies. There it has
-        // 0.30 (red, mean of the seven brightest of these pixels), our own `path` with 60,000 samples a pixel 0.56, `sppm` 0.50 at half a
+        // 0.30 (red, mean of the seven of these pixels where `sppm` and `ptracer` differ most), our own `path` with 60,000 samples a pixel 0.56, `sppm` 0.50 at half a
         // footprint (docs/verification.md).
         for i in (64..66).flat_map(|y| (51..57).map(move |x| y * 96 + x)) {
             kept[i] = false;
