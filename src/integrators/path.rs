@@ -128,6 +128,9 @@ impl<'a> Path<'a> {
         let last = Some(depth) == self.common.max_depth;
         arrivals.clear();
         for ((&number, ray), hit) in live.iter().zip(rays.iter()).zip(hits.iter()) {
+            if last && hit.is_some_and(|raw| !self.scene.shines(&raw)) {
+                continue;
+            }
             let walk = &mut walks[number as usize];
             let hit = hit.as_ref().map(|raw| self.scene.hit(ray, raw));
             if let Some(emission) = self.emission(depth, walk, ray, hit.as_ref()) {
@@ -153,7 +156,7 @@ impl<'a> Path<'a> {
             None => self.scene.escaped(ray.d),
         };
         let hidden = depth == 1 && self.common.hide_emitters;
-        if depth < self.common.min_depth || hidden || !walk.follow.emission_counts() {
+        if emitted.radiance.is_black() || depth < self.common.min_depth || hidden || !walk.follow.emission_counts() {
             return None;
         }
         let weight = walk.sampled_pdf.map_or(1.0, |pdf| power_heuristic(pdf, emitted.pdf_direct.0));

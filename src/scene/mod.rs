@@ -188,6 +188,12 @@ impl Scene {
         self.surfaces.hit(ray, raw)
     }
 
+    /// Does the shape that was hit shine? Cheaper than [`Scene::hit`], which says so too.
+    #[inline(always)]
+    pub fn shines(&self, raw: &RawHit) -> bool {
+        self.surfaces.shines(raw)
+    }
+
     /// Whether anything is on each of many rays: `blocked[i]` belongs to `rays[i]`. Of two lengths the shorter counts.
     #[inline]
     pub fn occluded_each(&self, rays: &[Ray], blocked: &mut [bool]) {
