@@ -2,6 +2,7 @@
 
 use crate::math::Rgb;
 use glam::Vec2;
+use std::ops::Range;
 
 /// Sums of one colour per pixel, row-major from the top left.
 pub type Sums = Vec<[f64; 3]>;
@@ -114,29 +115,53 @@ impl Film {
         &mut self,
         start: impl Fn() -> A + Sync,
         sample: impl Fn(&mut A, usize, usize) -> Rgb + Sync,
-        mut finish_row: impl FnMut(A),
+        finish_row: impl FnMut(A),
     ) {
-        use rayon::prelude::*;
         let width = self.sums.width;
-        let row = |y: usize, sums: &mut [[f64; 3]], running: &mut [[f64; 3]]| {
+        let row = |(): &mut (), pixels: Range<usize>, values: &mut [Rgb]| {
             let mut state = start();
-            for (x, sum) in sums.iter_mut().enumerate() {
-                let value = sample(&mut state, x, y).to_array().map(f64::from);
-                add(sum, value);
-                if let Some(running) = running.get_mut(x) {
-                    add(running, value);
-                }
+            for (pixel, value) in pixels.zip(values) {
+                *value = sample(&mut state, pixel % width, pixel / width);
             }
             state
         };
-        let rows: Vec<A> = if self.running.is_empty() {
-            self.sums.eye.par_chunks_mut(width).enumerate().map(|(y, sums)| row(y, sums, &mut [])).collect()
+        self.add_eye_blocks(width, || (), row, finish_row);
+    }
+
+    /// Adds one camera-side sample to every pixel, blocks of pixels in parallel. `sample` is given consecutive pixels by their row-major
+    /// numbers, `block` of them but for the last block, and writes one value for each; what was there before means nothing. What it
+    /// returns goes to `finish_block`, in the blocks' order.
+    ///
+    /// `memory` is called once for each run of blocks that a worker takes, far more rarely than there are blocks; the values must not
+    /// depend on what an earlier block left there.
+    pub fn add_eye_blocks<M, A: Send>(
+        &mut self,
+        block: usize,
+        memory: impl Fn() -> M + Sync,
+        sample: impl Fn(&mut M, Range<usize>, &mut [Rgb]) -> A + Sync,
+        finish_block: impl FnMut(A),
+    ) {
+        use rayon::prelude::*;
+        let block = block.max(1);
+        let start = || (memory(), vec![Rgb::BLACK; block]);
+        let fill = |(memory, values): &mut (M, Vec<Rgb>), index: usize, sums: &mut [[f64; 3]], running: &mut [[f64; 3]]| {
+            let first = index * block;
+            let values = &mut values[..sums.len()];
+            let result = sample(memory, first..first + sums.len(), values);
+            let values = || values.iter().map(|value| value.to_array().map(f64::from));
+            sums.iter_mut().zip(values()).for_each(|(sum, value)| add(sum, value));
+            running.iter_mut().zip(values()).for_each(|(sum, value)| add(sum, value));
+            result
+        };
+        let results: Vec<A> = if self.running.is_empty() {
+            let blocks = self.sums.eye.par_chunks_mut(block).enumerate();
+            blocks.map_init(start, |own, (index, sums)| fill(own, index, sums, &mut [])).collect()
         } else {
-            let pairs = self.sums.eye.par_chunks_mut(width).zip(self.running.par_chunks_mut(width)).enumerate();
-            pairs.map(|(y, (sums, running))| row(y, sums, running)).collect()
+            let pairs = self.sums.eye.par_chunks_mut(block).zip(self.running.par_chunks_mut(block)).enumerate();
+            pairs.map_init(start, |own, (index, (sums, running))| fill(own, index, sums, running)).collect()
         };
         self.sums.eye_count += 1;
-        rows.into_iter().for_each(&mut finish_row);
+        results.into_iter().for_each(finish_block);
     }
 
     /// Adds one iteration's splats of `light_paths` light paths: batch after batch, each in its own order, whoever made them. The

@@ -1,19 +1,33 @@
 //! Path tracing: next event estimation and BSDF sampling joined by the power heuristic [VEACH 9.2]. The oracle of all other methods:
 //! it shares the scene and the rule for shading normals with them, and no random walk, no photon, no recursive weight.
+//!
+//! A block of pixels advances together, one edge at a time: all rays of the block are traced, then every path that met something is
+//! shaded, then all rays to lights are traced. No path knows of another; the block is there for the processor, which works on
+//! several of them at once.
+
+mod block;
+mod follow;
 
 use super::{Common, Integrator, IterationStats, MethodError, Settings};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::samplers::{Key, Purpose, Stream};
 use crate::scene::Scene;
-use crate::scene::bsdf::{Lobes, Mode};
+use crate::scene::bsdf::Mode;
 use crate::scene::emitter::EmitterKind;
-use crate::transport::class::PathClass;
+use crate::scene::hit::Hit;
+use crate::scene::ray::Ray;
 use crate::transport::shading::SurfacePoint;
 use crate::transport::walk::{CEILING, Tally, beyond_emitters};
+use block::{Arrival, Block, Unshadowed, Walk};
 use clap::Args;
+use follow::{AnyClass, Follow, Matching};
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
+
+/// Paths that advance together.
+const BLOCK: usize = 256;
 
 /// The path tracer has no settings of its own.
 #[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
@@ -22,7 +36,7 @@ pub struct PathSettings {}
 
 impl Settings for PathSettings {
     fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
-        Ok(Box::new(Path { scene, width: size.0, common: common.clone() }))
+        Ok(Box::new(Path { scene, width: size.0, common: common.clone(), block: BLOCK }))
     }
 }
 
@@ -30,6 +44,8 @@ struct Path<'a> {
     scene: &'a Scene,
     width: usize,
     common: Common,
+    /// Most paths that advance together; nothing but speed depends on it.
+    block: usize,
 }
 
 impl Integrator for Path<'_> {
@@ -39,18 +55,10 @@ impl Integrator for Path<'_> {
 
     /// One sample a pixel.
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
-        let mut stats = IterationStats { camera_paths: (film.width() * film.height()) as u64, ..Default::default() };
-        let sample = |tally: &mut Tally, x: usize, y: usize| {
-            let index = (y * self.width + x) as u64;
-            let mut stream = Key { seed: self.common.seed, iteration: i, index, purpose: Purpose::Camera }.stream();
-            let value = match &self.common.paths {
-                None => self.radiance::<_, false>(x, y, &mut stream, tally),
-                Some(_) => self.radiance::<_, true>(x, y, &mut stream, tally),
-            };
-            tally.finite(value)
-        };
-        film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
-        stats
+        match &self.common.paths {
+            None => self.sample_pixels(i, film, &AnyClass),
+            Some(pattern) => self.sample_pixels(i, film, &Matching::new(pattern)),
+        }
     }
 }
 
@@ -62,130 +70,193 @@ fn power_heuristic(a: f32, b: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-impl Path<'_> {
-    /// Radiance along a random camera ray through a pixel. `CLASSES` follows one set of lobes a vertex, so that every path has a class.
-    fn radiance<S: Stream, const CLASSES: bool>(&self, x: usize, y: usize, stream: &mut S, tally: &mut Tally) -> Rgb {
-        let scene = self.scene;
-        let max_depth = self.common.max_depth.unwrap_or(u32::MAX);
-        let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
-        let lens = Vec2::from(stream.next_2d());
-        let camera_ray = scene.camera().ray(film, lens);
-
-        let mut sum = Rgb::BLACK;
-        let mut ray = camera_ray.ray;
-        if self.common.hide_emitters {
-            ray = beyond_emitters(scene, ray, tally).0;
-        }
-        let mut throughput = Rgb::WHITE;
-        let mut eta = 1.0f32;
-        // Where the last direction left from, and its density; `None` where next event estimation could not have found it.
-        let mut from = camera_ray.end.p;
-        let mut sampled_pdf = None;
-        let mut class = PathClass::default();
-        let counts = |depth: u32, class: &PathClass| {
-            depth >= self.common.min_depth
-                && !(depth == 1 && self.common.hide_emitters)
-                && (!CLASSES || self.common.paths.as_ref().is_none_or(|pattern| class.matches(pattern)))
-        };
-
-        for depth in 1..=max_depth {
-            // ---- Emission met by the ray
-            tally.rays += 1;
-            let hit = scene.intersect(&ray);
-            let emitted = match &hit {
-                Some(hit) if hit.emitter.is_none() => None,
-                // A copy: what is lent out must lie in memory, and few hits shine.
-                Some(hit) => Some(scene.emitted(&{ *hit }, -ray.d, from)),
-                None => Some(scene.escaped(ray.d)),
-            };
-            if let Some(emitted) = emitted
-                && counts(depth, &class)
-            {
-                let weight = sampled_pdf.map_or(1.0, |pdf| power_heuristic(pdf, emitted.pdf_direct.0));
-                sum += throughput * emitted.radiance * weight;
-            }
-            let Some(hit) = hit else { break };
-            if depth == max_depth {
-                break;
-            }
-
-            // ---- The surface
-            let Some(point) = SurfacePoint::new(&hit, scene.bsdf(hit.shape), ray.d) else {
-                tally.sides_disagree += 1;
-                break;
-            };
-            let mut lobes = Lobes::All;
-            if CLASSES {
-                let diffuse = point.bsdf.albedo(point.uv, point.given_local, Lobes::Rough(1.0));
-                let rest = point.bsdf.albedo(point.uv, point.given_local, Lobes::Smooth(1.0));
-                let probability = diffuse / (diffuse + rest);
-                let choose_diffuse = stream.next_1d() < probability;
-                lobes = if choose_diffuse { Lobes::Rough(1.0) } else { Lobes::Smooth(1.0) };
-                throughput *= 1.0 / if choose_diffuse { probability } else { 1.0 - probability };
-            }
-
-            // ---- Next event estimation
-            let u_emitter = stream.next_1d();
-            let u_light = Vec2::from(stream.next_2d());
-            if point.bsdf.max_roughness() > 0.0
-                && let Some(light) = scene.sample_direct(point.end.p, u_emitter, u_light)
-            {
-                let (f, pdf) = point.eval_pdf(light.wi, Mode::Radiance, lobes);
-                if CLASSES {
-                    class.push(if lobes == Lobes::Rough(1.0) { b'D' } else { b'G' });
-                }
-                if !f.is_black() && counts(depth + 1, &class) {
-                    tally.rays += 1;
-                    if scene.visible(&point.end, &light) {
-                        let reachable = matches!(light.kind, EmitterKind::Surface | EmitterKind::Infinite);
-                        let weight = if reachable { power_heuristic(light.pdf.0, pdf) } else { 1.0 };
-                        let cos = light.wi.dot(point.frame.n).abs();
-                        sum += throughput * f * light.radiance * (cos * weight / light.pdf.0);
-                    }
-                }
-                if CLASSES {
-                    class.pop();
-                }
-            }
-
-            // ---- BSDF sampling
-            let u_lobe = stream.next_1d();
-            let u_direction = Vec2::from(stream.next_2d());
-            let Some(scattered) = point.sample(Mode::Radiance, lobes, u_lobe, u_direction) else { break };
-            throughput *= scattered.weight;
-            eta *= scattered.eta;
-            if CLASSES {
-                class.push(if scattered.delta {
-                    b'S'
-                } else if lobes == Lobes::Rough(1.0) {
-                    b'D'
-                } else {
-                    b'G'
-                });
-            }
-            from = point.end.p;
-            sampled_pdf = (!scattered.delta).then_some(scattered.pdf_fwd);
-
-            // ---- Russian roulette
-            if depth >= self.common.rr_depth {
-                // The squared index undoes the compression of radiance inside glass, which is no loss.
-                let survival = (throughput.max_component() * eta * eta).min(CEILING);
-                if stream.next_1d() >= survival {
+impl<'a> Path<'a> {
+    /// One sample a pixel; `eye` is the class of a path that has only begun.
+    fn sample_pixels<F: Follow>(&self, i: u64, film: &mut Film, eye: &F) -> IterationStats {
+        let mut stats = IterationStats { camera_paths: (film.width() * film.height()) as u64, ..Default::default() };
+        let sample = |block: &mut Block<'a, F>, pixels: Range<usize>, radiances: &mut [Rgb]| {
+            let mut tally = Tally::default();
+            self.start(i, pixels, eye, block, &mut tally);
+            radiances.fill(Rgb::BLACK);
+            for depth in 1..=self.common.max_depth.unwrap_or(u32::MAX) {
+                if block.live.is_empty() {
                     break;
                 }
-                throughput *= 1.0 / survival;
-            } else if throughput.is_black() {
-                break;
+                self.advance(depth, block, radiances, &mut tally);
             }
-            ray = point.end.ray(scattered.d);
+            radiances.iter_mut().for_each(|radiance| *radiance = tally.finite(*radiance));
+            tally
+        };
+        film.add_eye_blocks(self.block, || Block::new(self.block), sample, |tally| stats.count(&tally));
+        stats
+    }
+
+    /// Fills the block with a random camera ray through each of these pixels.
+    fn start<F: Follow>(&self, i: u64, pixels: Range<usize>, eye: &F, block: &mut Block<'a, F>, tally: &mut Tally) {
+        block.clear();
+        for pixel in pixels {
+            let (x, y) = (pixel % self.width, pixel / self.width);
+            let mut stream = Key { seed: self.common.seed, iteration: i, index: pixel as u64, purpose: Purpose::Camera }.stream();
+            let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
+            let lens = Vec2::from(stream.next_2d());
+            let camera_ray = self.scene.camera().ray(film, lens);
+            let mut ray = camera_ray.ray;
+            if self.common.hide_emitters {
+                ray = beyond_emitters(self.scene, ray, tally).0;
+            }
+            let from = camera_ray.end.p;
+            block.push(Walk { stream, throughput: Rgb::WHITE, eta: 1.0, from, sampled_pdf: None, follow: eye.clone() }, ray);
         }
-        sum
+    }
+
+    /// Takes every live path of the block along its edge number `depth` and, where it goes on, chooses the next one.
+    fn advance<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>, radiances: &mut [Rgb], tally: &mut Tally) {
+        tally.rays += block.rays.len() as u64;
+        self.scene.trace_each(&block.rays, &mut block.hits);
+        self.arrive(depth, block, radiances, tally);
+        self.find_light(depth, block, radiances, tally);
+        self.scatter(depth, block);
+        self.scene.occluded_each(&block.shadow_rays, &mut block.blocked);
+        for (light, _) in block.lights.iter().zip(&block.blocked).filter(|(_, blocked)| !**blocked) {
+            radiances[light.walk as usize] += light.value;
+        }
+    }
+
+    /// Adds the emission that paths meet, and finds the surfaces from which they may go on.
+    fn arrive<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>, radiances: &mut [Rgb], tally: &mut Tally) {
+        let Block { walks, live, rays, hits, arrivals, .. } = block;
+        let last = Some(depth) == self.common.max_depth;
+        arrivals.clear();
+        for ((&number, ray), hit) in live.iter().zip(rays.iter()).zip(hits.iter()) {
+            if last && hit.is_some_and(|raw| !self.scene.shines(&raw)) {
+                continue;
+            }
+            let walk = &mut walks[number as usize];
+            let hit = hit.as_ref().map(|raw| self.scene.hit(ray, raw));
+            if let Some(emission) = self.emission(depth, walk, ray, hit.as_ref()) {
+                radiances[number as usize] += emission;
+            }
+            let Some(hit) = hit.filter(|_| !last) else { continue };
+            let Some(point) = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d) else {
+                tally.sides_disagree += 1;
+                continue;
+            };
+            walk.throughput *= walk.follow.choose_lobes(&point, &mut walk.stream);
+            arrivals.push(Arrival { walk: number, point });
+        }
+    }
+
+    /// What a path gains by the emission it meets; `None` where nothing shines.
+    #[inline(always)]
+    fn emission<F: Follow>(&self, depth: u32, walk: &Walk<F>, ray: &Ray, hit: Option<&Hit>) -> Option<Rgb> {
+        let emitted = match hit {
+            Some(hit) if hit.emitter.is_none() => return None,
+            // A copy: what is lent out must lie in memory, and few hits shine.
+            Some(hit) => self.scene.emitted(&{ *hit }, -ray.d, walk.from),
+            None => self.scene.escaped(ray.d),
+        };
+        let hidden = depth == 1 && self.common.hide_emitters;
+        if emitted.radiance.is_black() || depth < self.common.min_depth || hidden || !walk.follow.emission_counts() {
+            return None;
+        }
+        let weight = walk.sampled_pdf.map_or(1.0, |pdf| power_heuristic(pdf, emitted.pdf_direct.0));
+        Some(walk.throughput * emitted.radiance * weight)
+    }
+
+    /// Next event estimation: a light sample for every surface point, and the ray that tells whether it counts.
+    fn find_light<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>, radiances: &mut [Rgb], tally: &mut Tally) {
+        let Block { walks, arrivals, lights, shadow_rays, .. } = block;
+        lights.clear();
+        shadow_rays.clear();
+        for &Arrival { walk: number, ref point } in arrivals.iter() {
+            let walk = &mut walks[number as usize];
+            let u_emitter = walk.stream.next_1d();
+            let u_light = Vec2::from(walk.stream.next_2d());
+            if point.bsdf.max_roughness() <= 0.0 {
+                continue;
+            }
+            let Some(light) = self.scene.sample_direct(point.end.p, u_emitter, u_light) else { continue };
+            let (f, pdf) = point.eval_pdf(light.wi, Mode::Radiance, walk.follow.lobes());
+            if f.is_black() || depth + 1 < self.common.min_depth || !walk.follow.light_counts() {
+                continue;
+            }
+            let reachable = matches!(light.kind, EmitterKind::Surface | EmitterKind::Infinite);
+            let weight = if reachable { power_heuristic(light.pdf.0, pdf) } else { 1.0 };
+            let cos = light.wi.dot(point.frame.n).abs();
+            let value = walk.throughput * f * light.radiance * (cos * weight / light.pdf.0);
+            tally.rays += 1;
+            match self.scene.shadow_ray(&point.end, &light) {
+                Some(ray) => {
+                    lights.push(Unshadowed { walk: number, value });
+                    shadow_rays.push(ray);
+                }
+                None => radiances[number as usize] += value,
+            }
+        }
+    }
+
+    /// BSDF sampling and Russian roulette: the next ray of every path that goes on.
+    fn scatter<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>) {
+        let Block { walks, live, rays, arrivals, .. } = block;
+        live.clear();
+        rays.clear();
+        for &Arrival { walk: number, ref point } in arrivals.iter() {
+            let walk = &mut walks[number as usize];
+            let u_lobe = walk.stream.next_1d();
+            let u_direction = Vec2::from(walk.stream.next_2d());
+            let Some(scattered) = point.sample(Mode::Radiance, walk.follow.lobes(), u_lobe, u_direction) else { continue };
+            walk.throughput *= scattered.weight;
+            walk.eta *= scattered.eta;
+            walk.follow.scatter(scattered.delta);
+            walk.from = point.end.p;
+            walk.sampled_pdf = (!scattered.delta).then_some(scattered.pdf_fwd);
+            if depth >= self.common.rr_depth {
+                // The squared index undoes the compression of radiance inside glass, which is no loss.
+                let survival = (walk.throughput.max_component() * walk.eta * walk.eta).min(CEILING);
+                if walk.stream.next_1d() >= survival {
+                    continue;
+                }
+                walk.throughput *= 1.0 / survival;
+            } else if walk.throughput.is_black() {
+                continue;
+            }
+            live.push(number);
+            rays.push(point.end.ray(scattered.d));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::power_heuristic;
+    use super::*;
+    use crate::scene::mitsuba::{LoadOptions, load};
+
+    /// Blocks are there for speed: neither the picture nor the counts depend on their width, whether or not it divides the film's.
+    #[test]
+    fn blocks_of_any_width_give_the_same_bits() {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bench/cornell-box/scene.xml");
+        let (width, height) = (19, 7);
+        let loaded = load(&file, &LoadOptions { resolution: Some((width as u32, height as u32)), ..Default::default() }).unwrap();
+        let pattern = crate::transport::class::pattern("LDD?E").unwrap();
+        for paths in [None, Some(pattern)] {
+            let common = Common { seed: 5, max_depth: Some(6), min_depth: 2, rr_depth: 3, hide_emitters: true, paths };
+            let render = |block: usize| {
+                let mut film = Film::new(width, height, true);
+                let mut path = Path { scene: &loaded.scene, width, common: common.clone(), block };
+                let mut stats = IterationStats::default();
+                for i in 0..3 {
+                    stats.add(&path.iterate(i, &mut film));
+                    film.finish_iteration();
+                }
+                (film, stats)
+            };
+            let one = render(1);
+            assert!(one.0.mean().iter().any(|c| !c.is_black()));
+            for block in [2, 16, 100, width * height, 256] {
+                assert!(render(block) == one, "blocks of {block}");
+            }
+        }
+    }
 
     #[test]
     fn weights_of_two_techniques_sum_to_one() {

@@ -10,7 +10,26 @@ use glam::Vec2;
 pub struct Discrete {
     /// `cumulative[i]` is the share of choices before `i`; one more entry than choices.
     cumulative: Vec<u32>,
+    /// What a draw asks of each choice.
+    shares: Vec<Share>,
+    /// For each run of `2^guide_shift` shares, the choice that holds the first of them: where the search begins.
+    guide: Vec<u32>,
+    guide_shift: u32,
 }
+
+/// What a draw asks of a choice.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    /// Reciprocal of its width in shares; never asked where that is zero.
+    inverse_width: f64,
+    /// As [`Choice::probability`].
+    probability: f32,
+}
+
+/// Entries of the guide for each choice: the more, the rarer a draw that has to step on from where the guide points.
+const GUIDE_ENTRIES: usize = 4;
+/// Most bits of the guide's index.
+const GUIDE_BITS: u32 = 20;
 
 /// A choice made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,12 +47,22 @@ impl Discrete {
     pub fn new(weights: impl Iterator<Item = f64> + Clone) -> Option<Self> {
         let mut cumulative = Vec::new();
         append(&mut cumulative, weights)?;
-        Some(Self { cumulative })
+        let count = cumulative.len() - 1;
+        let total = cumulative[count];
+        let share = |index: usize| Share {
+            inverse_width: 1.0 / f64::from(cumulative[index + 1] - cumulative[index]),
+            probability: probability(&cumulative, index),
+        };
+        let shares = (0..count).map(share).collect();
+        let guide_bits = (count * GUIDE_ENTRIES).next_power_of_two().ilog2().min(GUIDE_BITS);
+        let guide_shift = u32::BITS - guide_bits;
+        let guide = (0..1u32 << guide_bits).map(|entry| find(&cumulative, (entry << guide_shift).min(total - 1)) as u32).collect();
+        Some(Self { cumulative, shares, guide, guide_shift })
     }
 
     /// Number of choices.
     pub fn len(&self) -> usize {
-        self.cumulative.len() - 1
+        self.shares.len()
     }
 
     /// Never: there is at least one choice.
@@ -44,18 +73,28 @@ impl Discrete {
     /// Draws; `u` in [0, 1).
     #[inline(always)]
     pub fn sample(&self, u: f32) -> Choice {
-        sample(&self.cumulative, u)
+        if self.shares.len() == 1 {
+            return Choice { index: 0, probability: 1.0, rest: u };
+        }
+        let (x, whole) = place(self.cumulative[self.shares.len()], u);
+        let mut index = self.guide[(whole >> self.guide_shift) as usize] as usize;
+        while self.cumulative[index + 1] <= whole {
+            index += 1;
+        }
+        let Share { inverse_width, probability } = self.shares[index];
+        let rest = ((x - f64::from(self.cumulative[index])) * inverse_width) as f32;
+        Choice { index, probability, rest: rest.clamp(0.0, ONE_BELOW) }
     }
 
     /// Probability of `index`.
     #[inline]
     pub fn probability(&self, index: usize) -> f32 {
-        probability(&self.cumulative, index)
+        self.shares[index].probability
     }
 
     /// Bytes on the heap.
     pub fn memory(&self) -> usize {
-        self.cumulative.capacity() * size_of::<u32>()
+        (self.cumulative.capacity() + self.guide.capacity()) * size_of::<u32>() + self.shares.capacity() * size_of::<Share>()
     }
 }
 
@@ -78,6 +117,19 @@ fn append(cumulative: &mut Vec<u32>, weights: impl Iterator<Item = f64> + Clone)
     Some(total)
 }
 
+/// Where among `total` shares a random number falls, and the number of the share it falls into.
+#[inline(always)]
+fn place(total: u32, u: f32) -> (f64, u32) {
+    let x = f64::from(u) * f64::from(total);
+    (x, (x as u32).min(total - 1))
+}
+
+/// The choice that holds a share.
+#[inline(always)]
+fn find(cumulative: &[u32], share: u32) -> usize {
+    cumulative.partition_point(|&c| c <= share) - 1
+}
+
 #[inline(always)]
 fn sample(cumulative: &[u32], u: f32) -> Choice {
     let last = cumulative.len() - 1;
@@ -85,9 +137,8 @@ fn sample(cumulative: &[u32], u: f32) -> Choice {
         return Choice { index: 0, probability: 1.0, rest: u };
     }
     let total = cumulative[last];
-    let x = f64::from(u) * f64::from(total);
-    let whole = (x as u32).min(total - 1);
-    let index = cumulative.partition_point(|&c| c <= whole) - 1;
+    let (x, whole) = place(total, u);
+    let index = find(cumulative, whole);
     let (before, width) = (cumulative[index], cumulative[index + 1] - cumulative[index]);
     let rest = ((x - f64::from(before)) / f64::from(width)) as f32;
     Choice { index, probability: (f64::from(width) / f64::from(total)) as f32, rest: rest.clamp(0.0, ONE_BELOW) }
@@ -212,6 +263,21 @@ mod tests {
             assert_eq!(d.probability(i) > 0.0, *w > 0.0, "choice {i}");
         }
         assert!(((0..7).map(|i| f64::from(d.probability(i))).sum::<f64>() - 1.0).abs() < 1e-6);
+    }
+
+    /// The guide only says where to begin: choices of any number and of the most uneven weights are those of the plain search.
+    #[test]
+    fn guided_draws_are_those_of_a_search() {
+        let uneven = |i: usize| if i % 7 == 3 { 0.0 } else { 1.0 / (1.0 + (i * i) as f64) };
+        for n in [1usize, 2, 3, 26, 1000] {
+            let d = Discrete::new((0..n).map(uneven)).unwrap();
+            for i in 0..10_000 {
+                let u = (i as f32 + 0.5) / 10_000.0;
+                let (guided, searched) = (d.sample(u), sample(&d.cumulative, u));
+                assert_eq!((guided.index, guided.probability), (searched.index, searched.probability), "{n} choices, {u}");
+                assert!((guided.rest - searched.rest).abs() <= f32::EPSILON, "{n} choices, {u}");
+            }
+        }
     }
 
     #[test]

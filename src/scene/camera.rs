@@ -255,6 +255,7 @@ impl Camera {
     }
 
     /// The ray through `film`, a position in pixels of the window rendered; `lens` in `[0, 1)^2` chooses the point on the lens, if there is one.
+    #[inline]
     pub fn ray(&self, film: Vec2, lens: Vec2) -> CameraRay {
         let on_plane = (self.corner + film * self.step).extend(1.0);
         let (origin, d) = match self.description.lens {

@@ -24,6 +24,8 @@ pub struct Area {
     choice: Option<Discrete>,
     /// Area of the shape, world units squared.
     area: f32,
+    /// Density of a point chosen uniformly by area.
+    pdf: AreaPdf,
     /// Centre and radius, if it is a sphere that shines outwards.
     sphere: Option<(DVec3, f64)>,
 }
@@ -47,7 +49,7 @@ impl Area {
         let area: f64 = primitives.clone().map(|i| surfaces.area(i)).sum();
         let choice = if primitives.len() > 1 { Discrete::new(primitives.clone().map(|i| surfaces.area(i))) } else { None };
         let sphere = if primitives.len() == 1 { surfaces.as_quadric(primitives.start).and_then(Quadric::outward_sphere) } else { None };
-        Self { shape, radiance, first: primitives.start, choice, area: area as f32, sphere }
+        Self { shape, radiance, first: primitives.start, choice, area: area as f32, pdf: AreaPdf(1.0 / area as f32), sphere }
     }
 
     /// The shape that shines.
@@ -117,11 +119,13 @@ impl Area {
         }
         let point = self.sample_position(surfaces, u_primitive, u);
         let to_light = point.end.p - from;
+        // Which side is seen does not wait for the length: a cosine times the distance so far.
+        let cos_light = emission_cosine(point.end.n_g, point.n_s, -to_light)?;
         let distance2 = to_light.length_squared();
         let distance = distance2.sqrt();
         let wi = to_light * (1.0 / distance);
-        let cos_light = emission_cosine(point.end.n_g, point.n_s, -wi)?;
-        let pdf = AreaPdf(1.0 / self.area).to_solid_angle(cos_light, distance2);
+        let cos_light = cos_light * (1.0 / distance);
+        let pdf = self.pdf.to_solid_angle(cos_light, distance2);
         Some(AreaSample { end: point.end, wi, distance, cos_light, radiance: self.radiance.eval(point.uv), pdf })
     }
 
@@ -133,7 +137,7 @@ impl Area {
         };
         let pdf_direct = match self.cone(from) {
             Some(cone) => cone.pdf(),
-            None => AreaPdf(1.0 / self.area).to_solid_angle(cos_light, end.p.distance_squared(from)),
+            None => self.pdf.to_solid_angle(cos_light, end.p.distance_squared(from)),
         };
         Emitted { radiance: self.radiance.eval(uv), pdf_direct }
     }
@@ -157,7 +161,7 @@ impl Area {
     /// Densities of [`Area::sample_emission`] under this cosine.
     #[inline]
     pub(super) fn emission_pdf(&self, cos_light: f32) -> EmissionPdf {
-        EmissionPdf { position: AreaPdf(1.0 / self.area), direction: SolidAnglePdf(cos_light * FRAC_1_PI) }
+        EmissionPdf { position: self.pdf, direction: SolidAnglePdf(cos_light * FRAC_1_PI) }
     }
 
     pub(super) fn memory(&self) -> usize {

@@ -185,6 +185,12 @@ impl Surfaces {
         Hit { t: raw.t, end: point.end, frame, uv: point.uv, prim: raw.prim, shape: ShapeId(record.shape), emitter: owner.emitter }
     }
 
+    /// Does the shape of the primitive that was met shine?
+    #[inline(always)]
+    pub(in crate::scene) fn shines(&self, raw: &RawHit) -> bool {
+        self.owners[self.records[raw.prim as usize].shape as usize].emitter.is_some()
+    }
+
     /// The surface of a quadric where a ray met it.
     #[inline(never)]
     fn on_quadric(&self, record: &Record, ray: &Ray, t: f32, tangents: bool) -> (SurfacePoint, Frame) {
