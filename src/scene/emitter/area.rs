@@ -2,6 +2,7 @@
 
 use super::{EmissionPdf, Emitted};
 use crate::math::distribution::Discrete;
+use crate::math::elementary::sin_cos_turns;
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, warp};
 use crate::scene::ShapeId;
 use crate::scene::hit::Endpoint;
@@ -219,9 +220,9 @@ impl Cone {
         let cos_light = (1.0 - sin_light * sin_light).sqrt();
         // The angle at the centre is what the other two leave.
         let (sin_center, cos_center) = (sin_light * cos - cos_light * sin, cos_light * cos + sin_light * sin);
-        let (s, c) = (TAU * f64::from(u.y)).sin_cos();
+        let (s, c) = sin_cos_turns(u.y);
         let (across_s, across_t) = self.axis.any_orthonormal_pair();
-        let across = across_s * c + across_t * s;
+        let across = across_s * f64::from(c) + across_t * f64::from(s);
         let wi = self.axis * cos + across * sin;
         (across * sin_center - self.axis * cos_center, wi.as_vec3(), cos_light as f32)
     }

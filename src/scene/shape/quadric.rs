@@ -2,6 +2,7 @@
 
 use super::ShapeError;
 use super::surface::SurfacePoint;
+use crate::math::elementary::turns;
 use crate::math::{Frame, warp};
 use crate::scene::accel::Primitive;
 use crate::scene::hit::Endpoint;
@@ -255,10 +256,10 @@ impl Quadric {
 
     /// Texture coordinates at a position of the unit shape, as Mitsuba has them.
     fn uv(&self, local: DVec3) -> Vec2 {
-        let turn = local.y.atan2(local.x) / TAU;
+        let turn = turns(local.y, local.x);
         let azimuth = (if turn < 0.0 { turn + 1.0 } else { turn }) as f32;
         match self.kind {
-            Kind::Sphere { .. } => Vec2::new(azimuth, (local.truncate().length().atan2(local.z) / PI) as f32),
+            Kind::Sphere { .. } => Vec2::new(azimuth, (2.0 * turns(local.truncate().length(), local.z)) as f32),
             Kind::Disk => Vec2::new(local.truncate().length() as f32, azimuth),
             Kind::Cylinder => Vec2::new(azimuth, local.z as f32),
         }
