@@ -131,6 +131,38 @@ macro_rules! dispatch {
     };
 }
 
+/// What every material says whose lobes are all deltas: no value, no density.
+macro_rules! all_deltas {
+    () => {
+        #[inline(always)]
+        pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
+            Rgb::BLACK
+        }
+
+        #[inline(always)]
+        pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
+            0.0
+        }
+
+        #[inline(always)]
+        pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
+            (Rgb::BLACK, 0.0)
+        }
+
+        pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+            lobes.admit(0.0)
+        }
+
+        pub(super) fn max_roughness(&self) -> f32 {
+            0.0
+        }
+
+        pub(super) fn anisotropic(&self) -> bool {
+            false
+        }
+    };
+}
+
 impl Bsdf {
     /// `f(wi -> wo)` for radiance, without cosine, over the non-delta lobes among `lobes`.
     #[inline]

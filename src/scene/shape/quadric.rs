@@ -224,9 +224,16 @@ impl Quadric {
         self.at(local)
     }
 
-    /// The point of a sphere in this unit direction from its centre.
-    pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> SurfacePoint {
-        self.at(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
+    /// The point of an outward sphere in this unit direction from its centre; `None` for any other shape.
+    #[inline]
+    pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> Option<Endpoint> {
+        let (center, radius) = self.outward_sphere()?;
+        Some(endpoint(center + outward * radius, outward.as_vec3()))
+    }
+
+    /// Texture coordinates of a sphere there.
+    pub(in crate::scene) fn uv_in_direction(&self, outward: DVec3) -> Vec2 {
+        self.uv(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
     }
 
     /// The point at a position of the unit shape.
@@ -248,10 +255,7 @@ impl Quadric {
             }
         };
         let n = if self.flipped { -n } else { n }.as_vec3();
-        let p32 = p.as_vec3();
-        // Half an ulp in each coordinate, and as much again for the normal's own rounding; the f64 work adds nothing at this scale.
-        let offset = f32::EPSILON * p32.abs().dot(n.abs());
-        SurfacePoint { end: Endpoint { p: p32, n_g: n, offset }, n_s: n, uv: self.uv(local) }
+        SurfacePoint { end: endpoint(p, n), n_s: n, uv: self.uv(local) }
     }
 
     /// Texture coordinates at a position of the unit shape, as Mitsuba has them.
@@ -273,4 +277,12 @@ impl Quadric {
         };
         self.to_world.transform_vector3(along).as_vec3()
     }
+}
+
+/// A point on a quadric of this unit normal.
+#[inline(always)]
+fn endpoint(p: DVec3, n: Vec3) -> Endpoint {
+    let p = p.as_vec3();
+    // Half an ulp in each coordinate, and as much again for the normal's own rounding; the f64 work adds nothing at this scale.
+    Endpoint { p, n_g: n, offset: f32::EPSILON * p.abs().dot(n.abs()) }
 }
