@@ -1,11 +1,12 @@
 //! Maps from the unit square to directions and surfaces, each beside its density. Every `u` component lies in [0, 1).
 
+use super::elementary::{sin_cos_eighth, sin_cos_turns};
 use super::measure::SolidAnglePdf;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 /// Uniform on the unit disk, by the concentric map; density `1/pi`.
-#[inline]
+#[inline(always)]
 pub fn disk(u: Vec2) -> Vec2 {
     let o = 2.0 * u - Vec2::ONE;
     if o == Vec2::ZERO {
@@ -18,18 +19,8 @@ pub fn disk(u: Vec2) -> Vec2 {
     if wide { Vec2::new(r * cos, r * sin) } else { Vec2::new(r * sin, r * cos) }
 }
 
-/// Sine and cosine of an angle in [-pi/4, pi/4], to about one unit in the last place: their series ([AS64 4.3.65, 4.3.66]), cut where the
-/// next term is below half a unit.
-#[inline(always)]
-fn sin_cos_eighth(x: f32) -> (f32, f32) {
-    let x2 = x * x;
-    let sin = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5_040.0 + x2 * (1.0 / 362_880.0))));
-    let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
-    (sin, cos)
-}
-
 /// Cosine-weighted directions on the hemisphere around +z.
-#[inline]
+#[inline(always)]
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let d = disk(u);
     // The floor keeps the direction strictly above the surface, so that its density is positive.
@@ -47,7 +38,7 @@ pub fn cosine_hemisphere_pdf(cos: f32) -> SolidAnglePdf {
 pub fn sphere(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
     let r = (1.0 - z * z).max(0.0).sqrt();
-    let (sin, cos) = (TAU * u.y).sin_cos();
+    let (sin, cos) = sin_cos_turns(u.y);
     Vec3::new(r * cos, r * sin, z)
 }
 
@@ -61,7 +52,7 @@ pub const SPHERE_PDF: SolidAnglePdf = SolidAnglePdf(FRAC_1_PI * 0.25);
 pub fn cone(u: Vec2, one_minus_cos_max: f32) -> Vec3 {
     let h = u.x * one_minus_cos_max;
     let sin = (h * (2.0 - h)).max(0.0).sqrt();
-    let (s, c) = (TAU * u.y).sin_cos();
+    let (s, c) = sin_cos_turns(u.y);
     Vec3::new(sin * c, sin * s, 1.0 - h)
 }
 

@@ -4,6 +4,7 @@ use crate::math::Rgb;
 use glam::{Affine2, Vec2};
 
 pub mod bitmap;
+mod tiles;
 
 pub use bitmap::{Bitmap, Decoding, Filter, Texels, TextureError, Wrap};
 
@@ -54,6 +55,14 @@ impl Texture {
             Texture::Constant(c) => *c,
             Texture::Bitmap(b) => b.eval(uv),
             Texture::Checkerboard(c) => c.at(uv, [&c.color0, &c.color1]).eval(uv),
+        }
+    }
+
+    /// Fetches what [`Texture::eval`] will soon ask of the memory here.
+    #[inline(always)]
+    pub fn prefetch(&self, uv: Vec2) {
+        if let Texture::Bitmap(b) = self {
+            b.prefetch(uv);
         }
     }
 

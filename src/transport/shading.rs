@@ -55,6 +55,7 @@ impl<'a> SurfacePoint<'a> {
     #[inline(always)]
     pub fn new(hit: &Hit, bsdf: &'a Bsdf, d: Vec3) -> Option<Self> {
         let given = -d;
+        bsdf.prefetch(hit.uv);
         sides_agree(given, hit.end.n_g, hit.frame.n).then(|| Self {
             bsdf,
             end: hit.end,

@@ -1,5 +1,7 @@
 //! Beckmann's distribution with roughness 1: shadowing and visible slopes.
 
+use crate::math::elementary::exp_negative;
+
 /// `G1/cos` by the rational fit [WALTER07 (27)]; `stretched / cos` is `alpha tan`.
 #[inline(always)]
 pub(super) fn fitted_g1_over_cos(cos: f32, stretched: f32) -> f32 {
@@ -19,7 +21,7 @@ pub(super) fn exact_g1_over_cos(cos: f32, stretched: f32) -> f32 {
         return 1.0 / cos;
     }
     let a = cos / stretched;
-    let tail = 0.5 * (-a * a).exp() * (stretched * FRAC_1_SQRT_PI - cos * scaled_erfc(a));
+    let tail = 0.5 * exp_negative(-a * a) * (stretched * FRAC_1_SQRT_PI - cos * scaled_erfc(a));
     1.0 / (cos + tail)
 }
 
@@ -84,7 +86,7 @@ pub(super) fn visible_slope(cos: f32, sin: f32, u: f32) -> f32 {
         (1.0, cos)
     } else {
         let a = cos / sin;
-        let e = (-a * a).exp();
+        let e = exp_negative(-a * a);
         let b = 1.0 - scaled_erfc(a) * e;
         (b, 0.5 * cos * (1.0 + b) + 0.5 * FRAC_1_SQRT_PI * sin * e)
     };
@@ -94,7 +96,7 @@ pub(super) fn visible_slope(cos: f32, sin: f32, u: f32) -> f32 {
     let mut b: f32 = f32::clamp(high, -1.0 + 2.0 * HALF_STEP, 1.0 - 2.0 * HALF_STEP);
     let mut x = erf_inv(b);
     for _ in 0..16 {
-        let value = 0.5 * cos * (1.0 + b) + 0.5 * FRAC_1_SQRT_PI * sin * (-x * x).exp() - target;
+        let value = 0.5 * cos * (1.0 + b) + 0.5 * FRAC_1_SQRT_PI * sin * exp_negative(-x * x) - target;
         if value > 0.0 {
             high = b
         } else {

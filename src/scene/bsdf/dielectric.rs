@@ -20,20 +20,7 @@ pub struct Dielectric {
 }
 
 impl Dielectric {
-    #[inline(always)]
-    pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
-        Rgb::BLACK
-    }
-
-    #[inline(always)]
-    pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
-        0.0
-    }
-
-    #[inline(always)]
-    pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
-        (Rgb::BLACK, 0.0)
-    }
+    all_deltas!();
 
     #[inline]
     pub(super) fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
@@ -61,18 +48,6 @@ impl Dielectric {
         }
         let reflectance = fresnel::dielectric(given.z, self.eta).reflectance;
         self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), reflectance).mean()
-    }
-
-    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
-        lobes.admit(0.0)
-    }
-
-    pub(super) fn max_roughness(&self) -> f32 {
-        0.0
-    }
-
-    pub(super) fn anisotropic(&self) -> bool {
-        false
     }
 
     pub(super) fn transmissive(&self) -> bool {

@@ -16,28 +16,37 @@ pub struct Interface {
 
 /// Fresnel's equations for a direction whose cosine with the normal is `cos`, where the index of refraction below the normal over
 /// that above is `eta` ([WALTER07 (22)], written as the mean of the two polarisations).
-#[inline]
+#[inline(always)]
 pub fn dielectric(cos: f32, eta: f32) -> Interface {
     let eta = if cos >= 0.0 { eta } else { 1.0 / eta };
     let c = cos.abs();
-    // Snell's law. The product form keeps the digits of a grazing cosine.
-    let cos2_t = (eta * eta - (1.0 - c) * (1.0 + c)) / (eta * eta);
+    // Snell's law, times the squared index. The product form keeps the digits of a grazing cosine.
+    let g2 = eta * eta - (1.0 - c) * (1.0 + c);
     if eta == 1.0 {
         return Interface { reflectance: 0.0, cos_transmitted: -cos, eta };
     }
-    if cos2_t <= 0.0 || c <= 0.0 {
+    if g2 <= 0.0 || c <= 0.0 {
         return Interface { reflectance: 1.0, cos_transmitted: 0.0, eta };
     }
-    let cos_t = cos2_t.sqrt();
-    Interface { reflectance: reflectance(c, cos_t, eta), cos_transmitted: cos_t.copysign(-cos), eta }
+    let g = g2.sqrt();
+    Interface { reflectance: mean_of_squares(c, g, eta), cos_transmitted: (g / eta).copysign(-cos), eta }
 }
 
 /// Share of light reflected where both cosines with the normal are known, each positive, and `eta` is the index on the far side over
 /// that on the near side.
 #[inline(always)]
 pub fn reflectance(cos: f32, cos_transmitted: f32, eta: f32) -> f32 {
-    let r_s = (cos - eta * cos_transmitted) / (cos + eta * cos_transmitted);
-    let r_p = (cos_transmitted - eta * cos) / (cos_transmitted + eta * cos);
+    mean_of_squares(cos, eta * cos_transmitted, eta)
+}
+
+/// The mean of both polarisations' reflectances; `g` is the index times the refracted cosine.
+#[inline(always)]
+fn mean_of_squares(c: f32, g: f32, eta: f32) -> f32 {
+    // r_s = (c - g) / (c + g) and r_p = (g/eta - eta c) / (g/eta + eta c), over one denominator.
+    let eta2_c = eta * eta * c;
+    let (sum_s, sum_p) = (c + g, g + eta2_c);
+    let inverse = 1.0 / (sum_s * sum_p);
+    let (r_s, r_p) = ((c - g) * sum_p * inverse, (g - eta2_c) * sum_s * inverse);
     (0.5 * (r_s * r_s + r_p * r_p)).min(1.0)
 }
 

@@ -4,8 +4,9 @@
 //! side where a function says so.
 
 use super::beckmann;
+use crate::math::elementary::{exp_negative, sin_cos_turns};
 use glam::{Vec2, Vec3};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use std::f32::consts::FRAC_1_PI;
 
 /// The family of the distribution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,16 @@ pub struct Microfacet {
     pub sampling: NormalSampling,
 }
 
+/// `G1(w)/|w.z|` of a direction, the share of facets that it sees over its cosine; finite at grazing angles.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadowing {
+    /// As values use it: for Beckmann, \[WALTER07\]'s rational fit (27), as Mitsuba has it.
+    pub value: f32,
+    /// As the density of visible normals needs it, so that the density integrates to one: for Beckmann the exact function. The fit is
+    /// off by up to 0.35 %.
+    pub exact: f32,
+}
+
 /// The smoothest surface that 32-bit arithmetic bears; Mitsuba raises smaller values to it.
 pub const MIN_ALPHA: f32 = 1e-4;
 
@@ -65,12 +76,15 @@ impl Microfacet {
     /// `D(h)`, area of microfacets per steradian of normals and per unit of macroscopic area, for `h.z > 0`.
     #[inline(always)]
     pub fn d(&self, h: Vec3) -> f32 {
-        let (x, y, cos2) = (h.x / self.alpha_u, h.y / self.alpha_v, h.z * h.z);
+        let inverse = 1.0 / (self.alpha_u * self.alpha_v);
+        let (x, y, cos2) = (h.x * self.alpha_v * inverse, h.y * self.alpha_u * inverse, h.z * h.z);
         let slope2 = x * x + y * y;
-        let scale = FRAC_1_PI / (self.alpha_u * self.alpha_v);
         let d = match self.kind {
-            MicrofacetKind::Beckmann => scale * (-slope2 / cos2).exp() / (cos2 * cos2),
-            MicrofacetKind::Ggx => scale / ((slope2 + cos2) * (slope2 + cos2)),
+            MicrofacetKind::Beckmann => {
+                let inverse_cos2 = 1.0 / cos2;
+                FRAC_1_PI * inverse * exp_negative(-slope2 * inverse_cos2) * (inverse_cos2 * inverse_cos2)
+            }
+            MicrofacetKind::Ggx => FRAC_1_PI * inverse / ((slope2 + cos2) * (slope2 + cos2)),
         };
         // Mitsuba's cut-off; it also turns the 0/0 of a normal in the tangent plane into 0.
         if d * h.z > 1e-20 { d } else { 0.0 }
@@ -83,44 +97,36 @@ impl Microfacet {
         (x * x + y * y).sqrt()
     }
 
-    /// `G1(w)/|w.z|` as values use it; finite at grazing angles. The facet must be seen from its front.
-    ///
-    /// For Beckmann, \[WALTER07\]'s rational fit (27), as Mitsuba has it.
+    /// Shadowing of a direction, above the surface or below. The facet must be seen from its front.
     #[inline(always)]
-    pub fn g1_over_cos(&self, w: Vec3) -> f32 {
+    pub fn shadowing(&self, w: Vec3) -> Shadowing {
         let (cos, s) = (w.z.abs(), self.stretched(w));
         match self.kind {
-            MicrofacetKind::Ggx => 2.0 / (cos + (cos * cos + s * s).sqrt()),
-            MicrofacetKind::Beckmann => beckmann::fitted_g1_over_cos(cos, s),
+            MicrofacetKind::Ggx => {
+                let value = 2.0 / (cos + (cos * cos + s * s).sqrt());
+                Shadowing { value, exact: value }
+            }
+            MicrofacetKind::Beckmann => {
+                Shadowing { value: beckmann::fitted_g1_over_cos(cos, s), exact: beckmann::exact_g1_over_cos(cos, s) }
+            }
         }
     }
 
-    /// `G1(w)/|w.z|` as the density of visible normals needs it, so that the density integrates to one.
-    ///
-    /// For Beckmann this is the exact shadowing function; the fit of [`Microfacet::g1_over_cos`] is off by up to 0.35 %.
+    /// Density per steradian of drawing the normal `h` for a direction above the surface whose shadowing is `g` and whose cosine with
+    /// the normal is `cos_h > 0`; `d` is `D(h)`.
     #[inline(always)]
-    pub fn exact_g1_over_cos(&self, w: Vec3) -> f32 {
-        let (cos, s) = (w.z.abs(), self.stretched(w));
-        match self.kind {
-            MicrofacetKind::Ggx => 2.0 / (cos + (cos * cos + s * s).sqrt()),
-            MicrofacetKind::Beckmann => beckmann::exact_g1_over_cos(cos, s),
-        }
-    }
-
-    /// Density per steradian of drawing the normal `h` for a direction above the surface with `w . h = cos_h > 0`; `d` is `D(h)`.
-    #[inline(always)]
-    pub fn pdf(&self, w: Vec3, h: Vec3, cos_h: f32, d: f32) -> f32 {
+    pub fn pdf(&self, g: Shadowing, h: Vec3, cos_h: f32, d: f32) -> f32 {
         match self.sampling {
-            NormalSampling::Visible => d * self.exact_g1_over_cos(w) * cos_h,
+            NormalSampling::Visible => d * g.exact * cos_h,
             NormalSampling::All => d * h.z,
         }
     }
 
-    /// Density per steradian of the direction that `w` is reflected to at the facet `h`; arguments as for [`Microfacet::pdf`].
+    /// Density per steradian of the direction that a direction is reflected to at the facet `h`; arguments as for [`Microfacet::pdf`].
     #[inline(always)]
-    pub fn reflection_pdf(&self, w: Vec3, h: Vec3, cos_h: f32, d: f32) -> f32 {
+    pub fn reflection_pdf(&self, g: Shadowing, h: Vec3, cos_h: f32, d: f32) -> f32 {
         match self.sampling {
-            NormalSampling::Visible => 0.25 * d * self.exact_g1_over_cos(w),
+            NormalSampling::Visible => 0.25 * d * g.exact,
             // A facet seen from its back reflects nothing, and one seen edge on would have a density beyond what numbers hold.
             NormalSampling::All if cos_h > EDGE_ON => 0.25 * d * h.z / cos_h,
             NormalSampling::All => 0.0,
@@ -137,7 +143,7 @@ impl Microfacet {
                     MicrofacetKind::Beckmann => (-(-u.x).ln_1p()).sqrt(),
                     MicrofacetKind::Ggx => (u.x / (1.0 - u.x)).sqrt(),
                 };
-                let (sin, cos) = (TAU * u.y).sin_cos();
+                let (sin, cos) = sin_cos_turns(u.y);
                 Vec3::new(self.alpha_u * radius * cos, self.alpha_v * radius * sin, 1.0).normalize()
             }
             (NormalSampling::Visible, MicrofacetKind::Ggx) => self.sample_visible_ggx(w, u),
@@ -149,7 +155,7 @@ impl Microfacet {
     #[inline(always)]
     fn sample_visible_ggx(&self, w: Vec3, u: Vec2) -> Vec3 {
         let stretched = Vec3::new(w.x * self.alpha_u, w.y * self.alpha_v, w.z).normalize();
-        let (sin_phi, cos_phi) = (TAU * u.x).sin_cos();
+        let (sin_phi, cos_phi) = sin_cos_turns(u.x);
         let z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
         let sin = (1.0 - z * z).max(0.0).sqrt();
         let h = Vec3::new(sin * cos_phi, sin * sin_phi, z) + stretched;

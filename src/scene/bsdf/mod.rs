@@ -9,7 +9,9 @@
 //! (`transport`). Delta lobes have no value and no density: they exist in [`Bsdf::sample`] alone.
 
 use crate::math::Rgb;
+use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
+use twosided::turned;
 
 /// What is carried along a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,6 +131,38 @@ macro_rules! dispatch {
     };
 }
 
+/// What every material says whose lobes are all deltas: no value, no density.
+macro_rules! all_deltas {
+    () => {
+        #[inline(always)]
+        pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
+            Rgb::BLACK
+        }
+
+        #[inline(always)]
+        pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
+            0.0
+        }
+
+        #[inline(always)]
+        pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
+            (Rgb::BLACK, 0.0)
+        }
+
+        pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
+            lobes.admit(0.0)
+        }
+
+        pub(super) fn max_roughness(&self) -> f32 {
+            0.0
+        }
+
+        pub(super) fn anisotropic(&self) -> bool {
+            false
+        }
+    };
+}
+
 impl Bsdf {
     /// `f(wi -> wo)` for radiance, without cosine, over the non-delta lobes among `lobes`.
     #[inline]
@@ -143,13 +177,26 @@ impl Bsdf {
         dispatch!(self, b => b.pdf(uv, given, sampled, lobes))
     }
 
+    /// The material that faces `w`, one wrapper taken off, and the side it is on: directions are [`twosided::turned`] to it.
+    ///
+    /// Here and not in the list of materials, so that a wrapped material is chosen from the list once.
+    #[inline(always)]
+    fn facing(&self, w: Vec3) -> (&Bsdf, f32) {
+        match self {
+            Bsdf::TwoSided(b) => b.facing(w),
+            _ => (self, 1.0),
+        }
+    }
+
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, for a walk in `mode`: what next event estimation asks.
     #[inline(always)]
     pub fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        match self {
+        let (b, side) = self.facing(given);
+        let (given, sampled) = (turned(given, side), turned(sampled, side));
+        match b {
             Bsdf::Diffuse(b) => b.eval_pdf(uv, given, sampled, mode, lobes),
             _ => {
-                let (f, pdf) = self.eval_pdf_any(uv, given, sampled, mode, lobes);
+                let (f, pdf) = b.eval_pdf_any(uv, &given, &sampled, mode, lobes);
                 (f, pdf)
             }
         }
@@ -157,29 +204,31 @@ impl Bsdf {
 
     /// [`Bsdf::eval_pdf`] out of line: the commonest material is worth a place in every loop, all of them are not.
     #[inline(never)]
-    fn eval_pdf_any(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        dispatch!(self, b => b.eval_pdf(uv, given, sampled, mode, lobes))
+    fn eval_pdf_any(&self, uv: Vec2, given: &Vec3, sampled: &Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        dispatch!(self, b => b.eval_pdf(uv, *given, *sampled, mode, lobes))
     }
 
     /// A direction drawn from the lobes asked for, deltas included; `None` where the walk ends (absorbed, or below the surface).
     /// `u_lobe` chooses the lobe, `u` the direction; each coordinate is in [0, 1).
     #[inline(always)]
     pub fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        match self {
-            Bsdf::Diffuse(b) => b.sample(uv, given, mode, lobes, u_lobe, u),
+        let (b, side) = self.facing(given);
+        let given = turned(given, side);
+        let s = match b {
+            Bsdf::Diffuse(b) => b.sample(uv, given, mode, lobes, u_lobe, u)?,
             _ => {
                 // Part by part, so that the result of the case above need not go through the memory that this call writes to.
-                let BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta } =
-                    self.sample_any(uv, given, mode, lobes, u_lobe, u)?;
-                Some(BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta })
+                let BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta } = b.sample_any(uv, &given, mode, lobes, u_lobe, u)?;
+                BsdfSample { w, weight, pdf_fwd, pdf_rev, delta, roughness, eta }
             }
-        }
+        };
+        Some(BsdfSample { w: turned(s.w, side), ..s })
     }
 
     /// [`Bsdf::sample`] out of line.
     #[inline(never)]
-    fn sample_any(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        dispatch!(self, b => b.sample(uv, given, mode, lobes, u_lobe, u))
+    fn sample_any(&self, uv: Vec2, given: &Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        dispatch!(self, b => b.sample(uv, *given, mode, lobes, u_lobe, u))
     }
 
     /// The share of light from `given` that the lobes asked for scatter on (mean over colour, in [0, 1]), exact or approximate: for
@@ -200,7 +249,32 @@ impl Bsdf {
     pub fn max_roughness(&self) -> f32 {
         match self {
             Bsdf::Diffuse(b) => b.max_roughness(),
+            Bsdf::TwoSided(b) => b.max_roughness(),
             _ => self.max_roughness_any(),
+        }
+    }
+
+    /// Fetches the texels that questions about this point will soon ask for: they come from far away, and there is other work until then.
+    #[inline(always)]
+    pub fn prefetch(&self, uv: Vec2) {
+        if let Some(texture) = self.main_texture() {
+            texture.prefetch(uv);
+        }
+    }
+
+    /// The texture that nearly every question asks for.
+    #[inline(always)]
+    fn main_texture(&self) -> Option<&Texture> {
+        let mut b = self;
+        while let Bsdf::TwoSided(sides) = b {
+            b = &sides.front;
+        }
+        match b {
+            Bsdf::Diffuse(b) => Some(&b.reflectance),
+            Bsdf::Plastic(b) => Some(b.diffuse_reflectance()),
+            Bsdf::RoughPlastic(b) => Some(b.diffuse_reflectance()),
+            Bsdf::Phong(b) => Some(&b.diffuse_reflectance),
+            _ => None,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The energy-conserving Phong model. Mitsuba 3 has no such material.
 
 use super::{BsdfSample, Lobes, Mode};
+use crate::math::elementary::sin_cos_turns;
 use crate::math::{Frame, Rgb, warp};
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -110,7 +111,7 @@ impl Phong {
         let log_cos = (-u.x).ln_1p() / (self.exponent + 1.0);
         let (cos, versine) = (log_cos.exp(), -log_cos.exp_m1());
         let sin = (versine * (1.0 + cos)).max(0.0).sqrt();
-        let (sin_phi, cos_phi) = (TAU * u.y).sin_cos();
+        let (sin_phi, cos_phi) = sin_cos_turns(u.y);
         let axis = Vec3::new(-given.x, -given.y, given.z);
         Frame::from_normal(axis).to_world(Vec3::new(sin * cos_phi, sin * sin_phi, cos)).normalize()
     }

@@ -42,6 +42,11 @@ impl Plastic {
         Self { eta, diffuse_reflectance, specular_reflectance, nonlinear, specular_weight, internal_reflectance }
     }
 
+    #[inline(always)]
+    pub(super) fn diffuse_reflectance(&self) -> &Texture {
+        &self.diffuse_reflectance
+    }
+
     /// Probability of the specular lobe where the coat reflects `reflectance`; `None` if nothing can be sampled.
     #[inline(always)]
     fn p_specular(&self, reflectance: f32, lobes: Lobes) -> Option<f32> {

@@ -38,7 +38,7 @@ impl RoughConductor {
         }
         let h = (wi + wo).normalize();
         let m = &self.distribution;
-        self.fresnel(uv, wi.dot(h).clamp(0.0, 1.0)) * (0.25 * m.d(h) * m.g1_over_cos(wi) * m.g1_over_cos(wo))
+        self.fresnel(uv, wi.dot(h).clamp(0.0, 1.0)) * (0.25 * m.d(h) * m.shadowing(wi).value * m.shadowing(wo).value)
     }
 
     #[inline]
@@ -47,7 +47,8 @@ impl RoughConductor {
             return 0.0;
         }
         let h = (given + sampled).normalize();
-        self.distribution.reflection_pdf(given, h, given.dot(h), self.distribution.d(h))
+        let m = &self.distribution;
+        m.reflection_pdf(m.shadowing(given), h, given.dot(h), m.d(h))
     }
 
     #[inline]
@@ -57,9 +58,9 @@ impl RoughConductor {
         }
         let h = (given + sampled).normalize();
         let (m, cos_h) = (&self.distribution, given.dot(h));
-        let d = m.d(h);
-        let f = self.fresnel(uv, cos_h.clamp(0.0, 1.0)) * (0.25 * d * m.g1_over_cos(given) * m.g1_over_cos(sampled));
-        (f, m.reflection_pdf(given, h, cos_h, d))
+        let (d, g) = (m.d(h), m.shadowing(given));
+        let f = self.fresnel(uv, cos_h.clamp(0.0, 1.0)) * (0.25 * d * g.value * m.shadowing(sampled).value);
+        (f, m.reflection_pdf(g, h, cos_h, d))
     }
 
     #[inline]
@@ -75,17 +76,17 @@ impl RoughConductor {
         if cos_h <= 0.0 || w.z <= 0.0 {
             return None;
         }
-        let d = m.d(h);
-        let (pdf_fwd, pdf_rev) = (m.reflection_pdf(given, h, cos_h, d), m.reflection_pdf(w, h, cos_h, d));
+        let (d, g_given, g_w) = (m.d(h), m.shadowing(given), m.shadowing(w));
+        let (pdf_fwd, pdf_rev) = (m.reflection_pdf(g_given, h, cos_h, d), m.reflection_pdf(g_w, h, cos_h, d));
         if pdf_fwd <= 0.0 {
             return None;
         }
         // f cos / pdf with D, and what else is in both, cancelled.
         let geometry = match m.sampling {
-            NormalSampling::Visible => m.g1_over_cos(given) / m.exact_g1_over_cos(given),
-            NormalSampling::All => m.g1_over_cos(given) * cos_h / h.z,
+            NormalSampling::Visible => g_given.value / g_given.exact,
+            NormalSampling::All => g_given.value * cos_h / h.z,
         };
-        let weight = self.fresnel(uv, cos_h.min(1.0)) * (geometry * m.g1_over_cos(w) * w.z);
+        let weight = self.fresnel(uv, cos_h.min(1.0)) * (geometry * g_w.value * w.z);
         BsdfSample { w, weight, pdf_fwd, pdf_rev, delta: false, roughness, eta: 1.0 }.if_not_black()
     }
 

@@ -84,7 +84,7 @@ impl RoughDielectric {
     #[inline(always)]
     fn value(&self, uv: Vec2, at: &Facet, mode: Mode) -> Rgb {
         let m = &self.distribution;
-        let geometry = at.d * m.g1_over_cos(at.given) * m.g1_over_cos(at.sampled);
+        let geometry = at.d * m.shadowing(at.given).value * m.shadowing(at.sampled).value;
         if at.reflection {
             return self.specular_reflectance.eval(uv) * (0.25 * at.reflectance * geometry);
         }
@@ -103,7 +103,7 @@ impl RoughDielectric {
     fn facet_pdf(&self, w: Vec3, at: &Facet, w_h: f32) -> f32 {
         let m = &self.distribution;
         match m.sampling {
-            NormalSampling::Visible => m.pdf(w, at.h, w_h.abs(), at.d),
+            NormalSampling::Visible => m.pdf(m.shadowing(w), at.h, w_h.abs(), at.d),
             NormalSampling::All => self.widened(w).d(at.h) * at.h.z,
         }
     }

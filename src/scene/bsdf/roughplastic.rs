@@ -1,6 +1,6 @@
 //! A diffuse base under a microfacet dielectric coat, black from behind.
 
-use super::microfacet::{Microfacet, NormalSampling, reflect};
+use super::microfacet::{Microfacet, NormalSampling, Shadowing, reflect};
 use super::plastic::{base_albedo, specular_weight};
 use super::transmittance::CoatTransmittance;
 use super::{BsdfSample, Lobes, Mode, fresnel};
@@ -21,6 +21,8 @@ pub struct RoughPlastic {
     nonlinear: bool,
     /// Share of the specular lobe in the choice of a lobe, before the transmittance: from the textures' means.
     specular_weight: f32,
+    /// `1 / (pi eta^2)`.
+    base_scale: f32,
     coat: CoatTransmittance,
 }
 
@@ -29,6 +31,14 @@ struct Facet {
     h: Vec3,
     cos_h: f32,
     d: f32,
+}
+
+/// What a direction meets on its own: its cosine, the facets' shadowing, and the coat's transmittance.
+#[derive(Clone, Copy)]
+struct Side {
+    cos: f32,
+    g: Shadowing,
+    transmittance: f32,
 }
 
 impl RoughPlastic {
@@ -43,7 +53,13 @@ impl RoughPlastic {
         assert!(!distribution.anisotropic(), "a rough plastic's coat is isotropic");
         let specular_weight = specular_weight(&diffuse_reflectance, &specular_reflectance);
         let coat = CoatTransmittance::new(&distribution, eta);
-        Self { distribution, eta, diffuse_reflectance, specular_reflectance, nonlinear, specular_weight, coat }
+        let base_scale = FRAC_1_PI / (eta * eta);
+        Self { distribution, eta, diffuse_reflectance, specular_reflectance, nonlinear, specular_weight, base_scale, coat }
+    }
+
+    #[inline(always)]
+    pub(super) fn diffuse_reflectance(&self) -> &Texture {
+        &self.diffuse_reflectance
     }
 
     /// Probability of the specular lobe where the coat lets `transmittance` through; `None` if nothing can be sampled.
@@ -66,28 +82,31 @@ impl RoughPlastic {
         Facet { h, cos_h: a.dot(h), d: self.distribution.d(h) }
     }
 
-    /// `f` over the lobes asked for, both directions above the surface, with the coat's transmittance along both.
     #[inline(always)]
-    fn value(&self, uv: Vec2, a: Vec3, b: Vec3, at: &Facet, transmittance: [f32; 2], lobes: Lobes) -> Rgb {
+    fn side(&self, w: Vec3) -> Side {
+        Side { cos: w.z, g: self.distribution.shadowing(w), transmittance: self.coat.at(w.z) }
+    }
+
+    /// `f` over the lobes asked for, both directions above the surface.
+    #[inline(always)]
+    fn value(&self, uv: Vec2, a: Side, b: Side, at: &Facet, lobes: Lobes) -> Rgb {
         let mut f = Rgb::BLACK;
         if lobes.admit(self.distribution.alpha_u) {
-            let m = &self.distribution;
             let reflectance = fresnel::dielectric(at.cos_h, self.eta).reflectance;
-            f += self.specular_reflectance.eval(uv) * (0.25 * reflectance * at.d * m.g1_over_cos(a) * m.g1_over_cos(b));
+            f += self.specular_reflectance.eval(uv) * (0.25 * reflectance * at.d * a.g.value * b.g.value);
         }
         if lobes.admit(1.0) {
             let base = base_albedo(self.diffuse_reflectance.eval(uv), self.coat.internal_reflectance, self.nonlinear);
-            f += base * (transmittance[0] * transmittance[1] * FRAC_1_PI / (self.eta * self.eta));
+            f += base * (a.transmittance * b.transmittance * self.base_scale);
         }
         f
     }
 
-    /// Density of `sampled` given `given`, where the coat lets `transmittance` of the latter through.
+    /// Density of the other direction given this one, where the lobe is chosen with these odds.
     #[inline(always)]
-    fn density(&self, given: Vec3, sampled: Vec3, at: &Facet, transmittance: f32, lobes: Lobes) -> f32 {
-        let Some(p) = self.p_specular(transmittance, lobes) else { return 0.0 };
-        let specular = if p > 0.0 { p * self.distribution.reflection_pdf(given, at.h, at.cos_h, at.d) } else { 0.0 };
-        specular + (1.0 - p) * sampled.z * FRAC_1_PI
+    fn density(&self, given: Side, sampled: Side, at: &Facet, p_specular: f32) -> f32 {
+        let specular = if p_specular > 0.0 { p_specular * self.distribution.reflection_pdf(given.g, at.h, at.cos_h, at.d) } else { 0.0 };
+        specular + (1.0 - p_specular) * sampled.cos * FRAC_1_PI
     }
 
     #[inline]
@@ -95,7 +114,7 @@ impl RoughPlastic {
         if wi.z <= 0.0 || wo.z <= 0.0 {
             return Rgb::BLACK;
         }
-        self.value(uv, wi, wo, &self.facet(wi, wo), [self.coat.at(wi.z), self.coat.at(wo.z)], lobes)
+        self.value(uv, self.side(wi), self.side(wo), &self.facet(wi, wo), lobes)
     }
 
     #[inline]
@@ -103,7 +122,9 @@ impl RoughPlastic {
         if given.z <= 0.0 || sampled.z <= 0.0 {
             return 0.0;
         }
-        self.density(given, sampled, &self.facet(given, sampled), self.coat.at(given.z), lobes)
+        let a = self.side(given);
+        let p = self.p_specular(a.transmittance, lobes);
+        p.map_or(0.0, |p| self.density(a, self.side(sampled), &self.facet(given, sampled), p))
     }
 
     #[inline]
@@ -111,8 +132,9 @@ impl RoughPlastic {
         if given.z <= 0.0 || sampled.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
-        let (at, t) = (self.facet(given, sampled), [self.coat.at(given.z), self.coat.at(sampled.z)]);
-        (self.value(uv, given, sampled, &at, t, lobes), self.density(given, sampled, &at, t[0], lobes))
+        let (a, b, at) = (self.side(given), self.side(sampled), self.facet(given, sampled));
+        let pdf = self.p_specular(a.transmittance, lobes).map_or(0.0, |p| self.density(a, b, &at, p));
+        (self.value(uv, a, b, &at, lobes), pdf)
     }
 
     #[inline]
@@ -120,31 +142,30 @@ impl RoughPlastic {
         if given.z <= 0.0 {
             return None;
         }
-        let t_given = self.coat.at(given.z);
-        let p = self.p_specular(t_given, lobes)?;
+        let a = self.side(given);
+        let p = self.p_specular(a.transmittance, lobes)?;
         // ## A direction from one lobe, with the facet it came from
-        let (w, at, roughness) = if u_lobe < p {
+        let (w, h, roughness) = if u_lobe < p {
             let h = self.distribution.sample(given, u);
-            let cos_h = given.dot(h);
-            if self.distribution.sampling == NormalSampling::All && cos_h <= 0.0 {
+            if self.distribution.sampling == NormalSampling::All && given.dot(h) <= 0.0 {
                 return None;
             }
-            (reflect(given, h), Facet { h, cos_h, d: self.distribution.d(h) }, self.distribution.alpha_u)
+            (reflect(given, h), h, self.distribution.alpha_u)
         } else {
             let w = warp::cosine_hemisphere(u);
-            (w, self.facet(given, w), 1.0)
+            (w, (given + w).normalize(), 1.0)
         };
         if w.z <= 0.0 {
             return None;
         }
         // ## Value and densities of all lobes there
-        let t = [t_given, self.coat.at(w.z)];
-        let pdf_fwd = self.density(given, w, &at, t[0], lobes);
+        let (b, at) = (self.side(w), Facet { h, cos_h: given.dot(h), d: self.distribution.d(h) });
+        let pdf_fwd = self.density(a, b, &at, p);
         if pdf_fwd <= 0.0 {
             return None;
         }
-        let pdf_rev = self.density(w, given, &at, t[1], lobes);
-        let weight = self.value(uv, given, w, &at, t, lobes) * (w.z / pdf_fwd);
+        let pdf_rev = self.p_specular(b.transmittance, lobes).map_or(0.0, |p| self.density(b, a, &at, p));
+        let weight = self.value(uv, a, b, &at, lobes) * (w.z / pdf_fwd);
         BsdfSample { w, weight, pdf_fwd, pdf_rev, delta: false, roughness, eta: 1.0 }.if_not_black()
     }
 

@@ -24,20 +24,7 @@ impl ThinDielectric {
         2.0 * r / (1.0 + r)
     }
 
-    #[inline(always)]
-    pub(super) fn eval(&self, _uv: Vec2, _wi: Vec3, _wo: Vec3, _lobes: Lobes) -> Rgb {
-        Rgb::BLACK
-    }
-
-    #[inline(always)]
-    pub(super) fn pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _lobes: Lobes) -> f32 {
-        0.0
-    }
-
-    #[inline(always)]
-    pub(super) fn eval_pdf(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3, _mode: Mode, _lobes: Lobes) -> (Rgb, f32) {
-        (Rgb::BLACK, 0.0)
-    }
+    all_deltas!();
 
     #[inline]
     pub(super) fn sample(&self, uv: Vec2, given: Vec3, _mode: Mode, lobes: Lobes, u_lobe: f32, _u: Vec2) -> Option<BsdfSample> {
@@ -58,18 +45,6 @@ impl ThinDielectric {
             return 0.0;
         }
         self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), self.reflectance(given)).mean()
-    }
-
-    pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
-        lobes.admit(0.0)
-    }
-
-    pub(super) fn max_roughness(&self) -> f32 {
-        0.0
-    }
-
-    pub(super) fn anisotropic(&self) -> bool {
-        false
     }
 
     pub(super) fn transmissive(&self) -> bool {

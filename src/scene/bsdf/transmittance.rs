@@ -80,7 +80,7 @@ fn share(distribution: &Microfacet, nodes: &[(f32, f32)], cos: f32, eta: f32, th
                 Through::Transmitted => (-fresnel::refract(w, h, &interface), 1.0 - interface.reflectance),
             };
             if other.z > 0.0 && share > 0.0 {
-                sum += f64::from(2.0 * weight_along * weight_across * share * distribution.g1_over_cos(other) * other.z);
+                sum += f64::from(2.0 * weight_along * weight_across * share * distribution.shadowing(other).value * other.z);
             }
         }
     }

@@ -15,63 +15,59 @@ pub struct TwoSided {
     pub back: Option<Box<Bsdf>>,
 }
 
+/// The mirror image of a direction where `side` is -1, itself where it is 1.
 #[inline(always)]
-fn flip(w: Vec3) -> Vec3 {
-    Vec3::new(w.x, w.y, -w.z)
+pub(super) fn turned(w: Vec3, side: f32) -> Vec3 {
+    Vec3::new(w.x, w.y, w.z * side)
 }
 
 impl TwoSided {
-    /// The material that faces `w`, and whether directions must be flipped for it.
+    /// The material that faces `w`, and the side it is on: directions are [`turned`] to it.
     #[inline(always)]
-    fn facing(&self, w: Vec3) -> (&Bsdf, bool) {
-        if w.z >= 0.0 { (&self.front, false) } else { (self.back.as_ref().unwrap_or(&self.front), true) }
+    pub(super) fn facing(&self, w: Vec3) -> (&Bsdf, f32) {
+        if w.z >= 0.0 { (&self.front, 1.0) } else { (self.back.as_ref().unwrap_or(&self.front), -1.0) }
     }
 
     #[inline]
     pub(super) fn eval(&self, uv: Vec2, wi: Vec3, wo: Vec3, lobes: Lobes) -> Rgb {
-        match self.facing(wo) {
-            (b, false) => b.eval(uv, wi, wo, lobes),
-            (b, true) => b.eval(uv, flip(wi), flip(wo), lobes),
-        }
+        let (b, side) = self.facing(wo);
+        b.eval(uv, turned(wi, side), turned(wo, side), lobes)
     }
 
     #[inline]
     pub(super) fn pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
-        match self.facing(given) {
-            (b, false) => b.pdf(uv, given, sampled, lobes),
-            (b, true) => b.pdf(uv, flip(given), flip(sampled), lobes),
-        }
+        let (b, side) = self.facing(given);
+        b.pdf(uv, turned(given, side), turned(sampled, side), lobes)
     }
 
     #[inline]
     pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
-        match self.facing(given) {
-            (b, false) => b.eval_pdf(uv, given, sampled, mode, lobes),
-            (b, true) => b.eval_pdf(uv, flip(given), flip(sampled), mode, lobes),
-        }
+        let (b, side) = self.facing(given);
+        b.eval_pdf(uv, turned(given, side), turned(sampled, side), mode, lobes)
     }
 
     #[inline]
     pub(super) fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        match self.facing(given) {
-            (b, false) => b.sample(uv, given, mode, lobes, u_lobe, u),
-            (b, true) => b.sample(uv, flip(given), mode, lobes, u_lobe, u).map(|s| BsdfSample { w: flip(s.w), ..s }),
-        }
+        let (b, side) = self.facing(given);
+        b.sample(uv, turned(given, side), mode, lobes, u_lobe, u).map(|s| BsdfSample { w: turned(s.w, side), ..s })
     }
 
     pub(super) fn albedo(&self, uv: Vec2, given: Vec3, lobes: Lobes) -> f32 {
-        match self.facing(given) {
-            (b, false) => b.albedo(uv, given, lobes),
-            (b, true) => b.albedo(uv, flip(given), lobes),
-        }
+        let (b, side) = self.facing(given);
+        b.albedo(uv, turned(given, side), lobes)
     }
 
     pub(super) fn admitted_by(&self, lobes: Lobes) -> bool {
         self.front.admitted_by(lobes) || self.back.as_ref().is_some_and(|b| b.admitted_by(lobes))
     }
 
+    #[inline]
     pub(super) fn max_roughness(&self) -> f32 {
-        self.back.as_ref().map_or(0.0, |b| b.max_roughness()).max(self.front.max_roughness())
+        let of = |b: &Bsdf| match b {
+            Bsdf::Diffuse(b) => b.max_roughness(),
+            _ => b.max_roughness_any(),
+        };
+        self.back.as_ref().map_or(0.0, |b| of(b)).max(of(&self.front))
     }
 
     pub(super) fn anisotropic(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::{EmissionPdf, Emitted};
 use crate::math::distribution::Discrete;
+use crate::math::elementary::sin_cos_turns;
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, warp};
 use crate::scene::ShapeId;
 use crate::scene::hit::Endpoint;
@@ -104,10 +105,13 @@ impl Area {
     fn sample_cone(&self, cone: &Cone, surfaces: &Surfaces, from: Vec3, u: Vec2) -> Option<AreaSample> {
         let quadric = surfaces.as_quadric(self.first)?;
         let (outward, wi, cos_light) = cone.sample(u);
-        let point = quadric.in_direction(outward);
-        let distance = point.end.p.distance(from);
-        let radiance = self.radiance.eval(point.uv);
-        (cos_light > 0.0).then_some(AreaSample { end: point.end, wi, distance, cos_light, radiance, pdf: cone.pdf() })
+        let end = quadric.in_direction(outward)?;
+        let radiance = match &self.radiance {
+            Texture::Constant(radiance) => *radiance,
+            // Coordinates cost more than all the rest, and few lights are textured.
+            texture => texture.eval(quadric.uv_in_direction(outward)),
+        };
+        (cos_light > 0.0).then(|| AreaSample { end, wi, distance: end.p.distance(from), cos_light, radiance, pdf: cone.pdf() })
     }
 
     #[inline(always)]
@@ -223,10 +227,10 @@ impl Cone {
         let cos_light = (1.0 - sin_light * sin_light).sqrt();
         // The angle at the centre is what the other two leave.
         let (sin_center, cos_center) = (sin_light * cos - cos_light * sin, cos_light * cos + sin_light * sin);
-        let (s, c) = (TAU * f64::from(u.y)).sin_cos();
+        let (s, c) = sin_cos_turns(u.y);
         let (across_s, across_t) = self.axis.any_orthonormal_pair();
-        let across = across_s * c + across_t * s;
+        let across = across_s * f64::from(c) + across_t * f64::from(s);
         let wi = self.axis * cos + across * sin;
-        (across * sin_center - self.axis * cos_center, wi.as_vec3(), cos_light as f32)
+        ((across * sin_center - self.axis * cos_center).normalize_or(DVec3::Z), wi.as_vec3(), cos_light as f32)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::ShapeError;
 use super::surface::SurfacePoint;
+use crate::math::elementary::turns;
 use crate::math::{Frame, warp};
 use crate::scene::accel::Primitive;
 use crate::scene::hit::Endpoint;
@@ -223,9 +224,16 @@ impl Quadric {
         self.at(local)
     }
 
-    /// The point of a sphere in this unit direction from its centre.
-    pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> SurfacePoint {
-        self.at(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
+    /// The point of an outward sphere in this unit direction from its centre; `None` for any other shape.
+    #[inline]
+    pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> Option<Endpoint> {
+        let (center, radius) = self.outward_sphere()?;
+        Some(endpoint(center + outward * radius, outward.as_vec3()))
+    }
+
+    /// Texture coordinates of a sphere there.
+    pub(in crate::scene) fn uv_in_direction(&self, outward: DVec3) -> Vec2 {
+        self.uv(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
     }
 
     /// The point at a position of the unit shape.
@@ -247,18 +255,15 @@ impl Quadric {
             }
         };
         let n = if self.flipped { -n } else { n }.as_vec3();
-        let p32 = p.as_vec3();
-        // Half an ulp in each coordinate, and as much again for the normal's own rounding; the f64 work adds nothing at this scale.
-        let offset = f32::EPSILON * p32.abs().dot(n.abs());
-        SurfacePoint { end: Endpoint { p: p32, n_g: n, offset }, n_s: n, uv: self.uv(local) }
+        SurfacePoint { end: endpoint(p, n), n_s: n, uv: self.uv(local) }
     }
 
     /// Texture coordinates at a position of the unit shape, as Mitsuba has them.
     fn uv(&self, local: DVec3) -> Vec2 {
-        let turn = local.y.atan2(local.x) / TAU;
+        let turn = turns(local.y, local.x);
         let azimuth = (if turn < 0.0 { turn + 1.0 } else { turn }) as f32;
         match self.kind {
-            Kind::Sphere { .. } => Vec2::new(azimuth, (local.truncate().length().atan2(local.z) / PI) as f32),
+            Kind::Sphere { .. } => Vec2::new(azimuth, (2.0 * turns(local.truncate().length(), local.z)) as f32),
             Kind::Disk => Vec2::new(local.truncate().length() as f32, azimuth),
             Kind::Cylinder => Vec2::new(azimuth, local.z as f32),
         }
@@ -272,4 +277,12 @@ impl Quadric {
         };
         self.to_world.transform_vector3(along).as_vec3()
     }
+}
+
+/// A point on a quadric of this unit normal.
+#[inline(always)]
+fn endpoint(p: DVec3, n: Vec3) -> Endpoint {
+    let p = p.as_vec3();
+    // Half an ulp in each coordinate, and as much again for the normal's own rounding; the f64 work adds nothing at this scale.
+    Endpoint { p, n_g: n, offset: f32::EPSILON * p.abs().dot(n.abs()) }
 }
