@@ -47,6 +47,21 @@ pub trait Accel {
     fn closest(&self, ray: &Ray) -> Option<RawHit>;
     /// Is there any hit with `0 < t <= ray.t_max`?
     fn occluded(&self, ray: &Ray) -> bool;
+
+    /// [`Accel::closest`] of many rays, the same bit for bit: `hits[i]` belongs to `rays[i]`. Of two lengths the shorter counts, and what
+    /// lies beyond it in `hits` stays as it is.
+    fn closest_each(&self, rays: &[Ray], hits: &mut [Option<RawHit>]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.closest(ray);
+        }
+    }
+
+    /// [`Accel::occluded`] of many rays: `blocked[i]` belongs to `rays[i]`. Lengths as with [`Accel::closest_each`].
+    fn occluded_each(&self, rays: &[Ray], blocked: &mut [bool]) {
+        for (ray, blocked) in rays.iter().zip(blocked) {
+            *blocked = self.occluded(ray);
+        }
+    }
 }
 
 /// An axis-aligned box, `min <= max` in every component.

@@ -20,7 +20,7 @@ use camera::{Camera, CameraConnection, CameraError, FilmSpec};
 use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterKind, Emitters};
 use glam::{Vec2, Vec3};
 use hit::{Endpoint, Hit};
-use ray::Ray;
+use ray::{RawHit, Ray};
 use shape::surface::{self, Surfaces};
 use shape::{Geometry, Shape};
 
@@ -172,7 +172,26 @@ impl Scene {
     /// The closest hit.
     #[inline(always)]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.tree.closest(ray).map(|raw| self.surfaces.hit(ray, &raw))
+        self.tree.closest(ray).map(|raw| self.hit(ray, &raw))
+    }
+
+    /// The closest hits of many rays, without their surfaces: `hits[i]` belongs to `rays[i]`, bit for bit what one ray alone would get. Of two
+    /// lengths the shorter counts.
+    #[inline]
+    pub fn trace_each(&self, rays: &[Ray], hits: &mut [Option<RawHit>]) {
+        self.tree.closest_each(rays, hits);
+    }
+
+    /// The surface at a hit of `ray`: [`Scene::intersect`] is the closest hit and this.
+    #[inline(always)]
+    pub fn hit(&self, ray: &Ray, raw: &RawHit) -> Hit {
+        self.surfaces.hit(ray, raw)
+    }
+
+    /// Whether anything is on each of many rays: `blocked[i]` belongs to `rays[i]`. Of two lengths the shorter counts.
+    #[inline]
+    pub fn occluded_each(&self, rays: &[Ray], blocked: &mut [bool]) {
+        self.tree.occluded_each(rays, blocked);
     }
 
     /// Is anything between two points?
@@ -191,9 +210,15 @@ impl Scene {
     /// Can the point `from` see a light sample?
     #[inline(always)]
     pub fn visible(&self, from: &Endpoint, sample: &DirectSample) -> bool {
+        self.shadow_ray(from, sample).is_none_or(|ray| !self.tree.occluded(&ray))
+    }
+
+    /// The ray that is free if and only if the point `from` sees a light sample. `None` where the two coincide and nothing can be between.
+    #[inline(always)]
+    pub fn shadow_ray(&self, from: &Endpoint, sample: &DirectSample) -> Option<Ray> {
         match sample.kind {
-            EmitterKind::Surface | EmitterKind::DeltaPosition => !self.occluded(from, &sample.end),
-            EmitterKind::DeltaDirection | EmitterKind::Infinite => !self.occluded_ray(from, sample.wi),
+            EmitterKind::Surface | EmitterKind::DeltaPosition => Some(from.segment(&sample.end)).filter(|segment| segment.d != Vec3::ZERO),
+            EmitterKind::DeltaDirection | EmitterKind::Infinite => Some(from.ray(sample.wi)),
         }
     }
 
