@@ -1,7 +1,8 @@
 //! Many rays at once: which go together, and how.
 //!
-//! Rays are taken 256 at a time and put in groups with the same largest axis, as a packet needs it. Whatever a group then does, its rays
-//! are made ready together, which costs a third of making them ready one by one.
+//! In a small tree any eight rays visit nearly the same leaves: rays are taken 256 at a time and grouped by their largest axis, as a packet
+//! needs it. In a larger one only rays that start close to each other and go nearly the same way gain by company: eight neighbours in the
+//! list form a packet if they do, and otherwise each goes alone.
 
 use super::packet::{LANES, Packet, largest_axis};
 use super::{Bvh, RawHit, Ray};
@@ -9,7 +10,13 @@ use super::{Bvh, RawHit, Ray};
 /// Rays sorted at once; their numbers fit a byte.
 const BATCH: usize = 256;
 
-/// Leaves up to which any eight rays share a walk: in so small a tree they visit nearly the same leaves anyway.
+/// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
+const WAY: f32 = 0.25;
+
+/// How far apart they may start, in units of the scene's largest coordinate.
+const START: f32 = 0.05;
+
+/// Leaves of a small tree.
 const SMALL: usize = 24;
 
 /// Fewer rays than this go alone.
@@ -19,7 +26,6 @@ const LEAST: usize = 3;
 trait Question {
     type Answer: Copy;
     fn alone(bvh: &Bvh, ray: &Ray) -> Self::Answer;
-    fn ready<const K: usize>(bvh: &Bvh, p: &Packet<K>, lane: usize, ray: &Ray) -> Self::Answer;
     fn together<const K: usize>(bvh: &Bvh, p: &Packet<K>, rays: [&Ray; LANES]) -> [Self::Answer; LANES];
 }
 
@@ -31,11 +37,6 @@ impl Question for Closest {
     #[inline(always)]
     fn alone(bvh: &Bvh, ray: &Ray) -> Option<RawHit> {
         bvh.find_closest(ray)
-    }
-
-    #[inline(always)]
-    fn ready<const K: usize>(bvh: &Bvh, p: &Packet<K>, lane: usize, ray: &Ray) -> Option<RawHit> {
-        bvh.find_closest_ready(&p.probe(lane)?, ray)
     }
 
     #[inline(always)]
@@ -52,11 +53,6 @@ impl Question for Any {
     #[inline(always)]
     fn alone(bvh: &Bvh, ray: &Ray) -> bool {
         bvh.find_any(ray)
-    }
-
-    #[inline(always)]
-    fn ready<const K: usize>(bvh: &Bvh, p: &Packet<K>, lane: usize, ray: &Ray) -> bool {
-        p.probe(lane).is_some_and(|p| bvh.find_any_ready(&p, ray))
     }
 
     #[inline(always)]
@@ -85,26 +81,64 @@ fn by_axis(rays: &[Ray]) -> ([u8; BATCH], [usize; 3]) {
     (order, [next[0], next[1], next[2]])
 }
 
+/// Do eight rays start close to each other and go nearly the same way? If so, their largest axis.
+#[inline(always)]
+fn together(rays: &[Ray], reach: f32) -> Option<usize> {
+    let [first, others @ ..] = rays else {
+        return None;
+    };
+    let (way, start) = (first.d.abs().max_element() * WAY, reach * START);
+    let near = |r: &Ray| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start;
+    // The first neighbour already tells most strangers.
+    let axis = largest_axis(first.d);
+    (rays.len() == LANES && others.iter().all(near) && others.iter().all(|r| largest_axis(r.d) == axis)).then_some(axis)
+}
+
 impl Bvh {
     #[inline(always)]
-    fn group<Q: Question, const K: usize>(&self, rays: &[Ray], numbers: &[u8], answers: &mut [Q::Answer]) {
-        for group in numbers.chunks(LANES) {
-            if group.len() < LEAST {
-                for &n in group {
-                    answers[n as usize] = Q::alone(self, &rays[n as usize]);
+    fn packet<Q: Question>(&self, rays: [&Ray; LANES], axis: usize) -> [Q::Answer; LANES] {
+        match axis {
+            0 => Q::together(self, &Packet::<0>::new(rays, self.reach), rays),
+            1 => Q::together(self, &Packet::<1>::new(rays, self.reach), rays),
+            _ => Q::together(self, &Packet::<2>::new(rays, self.reach), rays),
+        }
+    }
+
+    /// For a small tree: all rays in packets.
+    #[inline(always)]
+    fn each_grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+        for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
+            let (order, ends) = by_axis(rays);
+            let mut start = 0;
+            for (axis, end) in ends.into_iter().enumerate() {
+                for group in order[start..end].chunks(LANES) {
+                    if group.len() < LEAST {
+                        for &n in group {
+                            answers[n as usize] = Q::alone(self, &rays[n as usize]);
+                        }
+                        continue;
+                    }
+                    // Lanes to spare do what the first does.
+                    let eight = std::array::from_fn(|i| &rays[*group.get(i).unwrap_or(&group[0]) as usize]);
+                    for (&n, answer) in group.iter().zip(self.packet::<Q>(eight, axis)) {
+                        answers[n as usize] = answer;
+                    }
                 }
+                start = end;
+            }
+        }
+    }
+
+    /// For a large tree: packets where neighbours go together.
+    #[inline(always)]
+    fn each_in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+        for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
+            if let Some(axis) = together(rays, self.reach) {
+                answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }
-            let group_rays: [&Ray; LANES] = std::array::from_fn(|i| &rays[*group.get(i).unwrap_or(&group[0]) as usize]);
-            let p = Packet::<K>::new(group_rays, self.reach);
-            if self.triangles.len() <= SMALL || p.coherent(self.reach) {
-                for (&n, answer) in group.iter().zip(Q::together(self, &p, group_rays)) {
-                    answers[n as usize] = answer;
-                }
-            } else {
-                for (lane, &n) in group.iter().enumerate() {
-                    answers[n as usize] = Q::ready(self, &p, lane, &rays[n as usize]);
-                }
+            for (ray, answer) in rays.iter().zip(answers) {
+                *answer = Q::alone(self, ray);
             }
         }
     }
@@ -112,11 +146,11 @@ impl Bvh {
     #[inline(always)]
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
-        for (rays, answers) in rays[..count].chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            let (order, [x, y, z]) = by_axis(rays);
-            self.group::<Q, 0>(rays, &order[..x], answers);
-            self.group::<Q, 1>(rays, &order[x..y], answers);
-            self.group::<Q, 2>(rays, &order[y..z], answers);
+        let (rays, answers) = (&rays[..count], &mut answers[..count]);
+        if self.triangles.len() + self.analytic.len() <= SMALL {
+            self.each_grouped::<Q>(rays, answers);
+        } else {
+            self.each_in_turn::<Q>(rays, answers);
         }
     }
 

@@ -7,7 +7,7 @@
 
 use super::analytic::Analytic;
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
-use super::probe::{FLATTEST, NEXT, PAD, Probe};
+use super::probe::{FLATTEST, NEXT, PAD};
 use super::triangle::{Best, DOUBTFUL, Tri4, exactly};
 use super::{Bvh, DEEP, RawHit, Ray};
 use glam::Vec3;
@@ -18,11 +18,6 @@ use wide::{f32x8, u32x8};
 pub(super) const LANES: usize = 8;
 /// A packet puts all children on the stack before it takes one back: one entry more than a single ray needs.
 const ENTRIES: usize = 2 * DEEP;
-
-/// How far apart two rays of a coherent packet may point, in units of the largest direction component.
-const WAY: f32 = 0.1;
-/// How far apart they may start, in units of the scene's largest coordinate.
-const START: f32 = 0.05;
 
 thread_local! {
     /// Where each ray enters what is still to be visited, infinity for those that miss it.
@@ -35,8 +30,7 @@ pub(super) struct Packet<const K: usize> {
     minus_o: [f32x8; 3],
     /// Scaled direction.
     d: [f32x8; 3],
-    /// What takes an outer `t` to a scaled one, and its inverse.
-    to_scaled: f32x8,
+    /// What takes a scaled `t` to an outer one.
     from_scaled: f32x8,
     /// Scaled `t_max`. NaN, which no comparison accepts, where no hit is possible.
     t_max: f32x8,
@@ -96,7 +90,6 @@ impl<const K: usize> Packet<K> {
         Self {
             minus_o,
             d,
-            to_scaled: from_unit,
             from_scaled: to_unit,
             t_max: possible.select(t_max, f32x8::splat(f32::NAN)),
             inv,
@@ -105,46 +98,6 @@ impl<const K: usize> Packet<K> {
             shear_x: d[Self::I] * inv[K],
             shear_y: d[Self::J] * inv[K],
         }
-    }
-
-    /// One ray of it, ready to go on alone; none if no hit is possible.
-    #[inline(always)]
-    pub(super) fn probe(&self, lane: usize) -> Option<Probe> {
-        let lane = lane & (LANES - 1);
-        let at = |v: &f32x8| v.as_array()[lane];
-        if at(&self.t_max).is_nan() {
-            return None;
-        }
-        let three = |v: &[f32x8; 3]| [at(&v[0]), at(&v[1]), at(&v[2])];
-        let (inv, minus_o, lower, upper) = (three(&self.inv), three(&self.minus_o), three(&self.lower), three(&self.upper));
-        let enters = inv.map(|inv| (inv.to_bits() >> 31) as usize);
-        let side = |k: usize, up: bool| if (enters[k] == 1) == up { upper[k] } else { lower[k] };
-        Some(Probe {
-            o: self.origin(lane),
-            d: self.direction(lane),
-            to_scaled: at(&self.to_scaled),
-            from_scaled: at(&self.from_scaled),
-            inv: [inv[0], inv[1], inv[2], 0.0],
-            near: [side(0, true), side(1, true), side(2, true), 0.0],
-            far: [side(0, false), side(1, false), side(2, false), 0.0],
-            enters,
-            axis: [Self::I, Self::J, K],
-            minus_origin: [minus_o[Self::I], minus_o[Self::J], minus_o[K]],
-            shear_x: at(&self.shear_x),
-            shear_y: at(&self.shear_y),
-            inv_z: inv[K],
-        })
-    }
-
-    /// Do the rays start close to each other and go nearly the same way?
-    #[inline(always)]
-    pub(super) fn coherent(&self, reach: f32) -> bool {
-        let spread = |v: f32x8| (v - f32x8::splat(v.as_array()[0])).abs();
-        let way = spread(self.shear_x).fast_max(spread(self.shear_y));
-        let start = spread(self.minus_o[0]).fast_max(spread(self.minus_o[1])).fast_max(spread(self.minus_o[2]));
-        let sign = self.inv[K].to_bitmask();
-        let near = way.simd_le(f32x8::splat(WAY)) & start.simd_le(f32x8::splat(START * reach));
-        near.all() && (sign == 0 || sign == 255)
     }
 
     #[inline(always)]

@@ -46,12 +46,6 @@ impl Bvh {
         STACK.with(|stack| self.closest_on(stack, &Probe::new(ray, self.reach)?, ray))
     }
 
-    /// The same for a ray made ready before.
-    #[inline(always)]
-    pub(super) fn find_closest_ready(&self, p: &Probe, ray: &Ray) -> Option<RawHit> {
-        STACK.with(|stack| self.closest_on(stack, p, ray))
-    }
-
     #[inline(always)]
     fn closest_on(&self, stack: &[Cell<u64>; DEEP], p: &Probe, ray: &Ray) -> Option<RawHit> {
         let mut best = Best { t: ray.t_max * p.to_scaled, u: 0.0, v: 0.0, prim: EMPTY };
@@ -131,12 +125,6 @@ impl Bvh {
     #[inline(always)]
     pub(super) fn find_any(&self, ray: &Ray) -> bool {
         STACK.with(|stack| Probe::new(ray, self.reach).is_some_and(|p| self.any_on(stack, &p, ray)))
-    }
-
-    /// The same for a ray made ready before.
-    #[inline(always)]
-    pub(super) fn find_any_ready(&self, p: &Probe, ray: &Ray) -> bool {
-        STACK.with(|stack| self.any_on(stack, p, ray))
     }
 
     #[inline(always)]

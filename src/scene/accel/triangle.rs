@@ -181,5 +181,7 @@ pub(super) fn exactly(o: Vec3, d: Vec3, [a, b, c]: [DVec3; 3], t: f32) -> f32 {
     if along == 0.0 {
         return t;
     }
-    (n.dot(a - o.as_dvec3()) / along) as f32
+    let ahead = n.dot(a - o.as_dvec3());
+    // Most often the ray leaves this triangle: that needs no quotient.
+    if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
 }
