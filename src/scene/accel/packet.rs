@@ -193,10 +193,9 @@ impl<const K: usize> Packet<K> {
                             break;
                         }
                         let (mask, enter) = self.meet(node, i, found.until());
-                        if mask.any() {
-                            stack[top & (ENTRIES - 1)].set((mask.select(enter, f32x8::splat(f32::INFINITY)), child));
-                            top += 1;
-                        }
+                        // Written in any case: whether a box is met by one ray of eight is hard to foretell.
+                        stack[top & (ENTRIES - 1)].set((mask.select(enter, f32x8::splat(f32::INFINITY)), child));
+                        top += usize::from(mask.any());
                     }
                 } else if at & ANALYTIC == 0 {
                     found.leaf(self, &bvh.triangles[(at & !LEAF) as usize]);
