@@ -178,12 +178,13 @@ impl<const K: usize> Packet<K> {
     /// The walk, front or back first as it comes: `open` says which rays are still in question up to which `t`, `leaf` and `analytic` look
     /// for hits and say whether to go on.
     #[inline(always)]
-    fn walk(&self, bvh: &Bvh, found: &mut impl Found<K>) {
-        STACK.with(|stack| {
+    fn walk<F: Found<K>>(&self, bvh: &Bvh, mut found: F) -> F {
+        // By value, in and out: as long as nobody has its address, it can stay in registers.
+        STACK.with(move |stack| {
             let mut top = 0;
             let mut at = bvh.root;
-            if at == EMPTY || self.t_max.is_nan().all() {
-                return;
+            if at == EMPTY {
+                return found;
             }
             loop {
                 if at & LEAF == 0 {
@@ -200,11 +201,11 @@ impl<const K: usize> Packet<K> {
                 } else if at & ANALYTIC == 0 {
                     found.leaf(self, &bvh.triangles[(at & !LEAF) as usize]);
                 } else {
-                    found.analytic(self, &bvh.analytic[(at & !(LEAF | ANALYTIC)) as usize]);
+                    found = found.analytic(self, &bvh.analytic[(at & !(LEAF | ANALYTIC)) as usize]);
                 }
                 loop {
                     if top == 0 {
-                        return;
+                        return found;
                     }
                     top -= 1;
                     let (enter, child) = stack[top & (ENTRIES - 1)].get();
@@ -215,14 +216,14 @@ impl<const K: usize> Packet<K> {
                     }
                 }
             }
-        });
+        })
     }
 
     /// The closest hit of each ray.
     #[inline(always)]
     pub(super) fn closest(&self, bvh: &Bvh, rays: [&Ray; LANES]) -> [Option<RawHit>; LANES] {
-        let mut best = Bests { t: self.t_max, u: f32x8::ZERO, v: f32x8::ZERO, prim: u32x8::splat(EMPTY) };
-        self.walk(bvh, &mut best);
+        let best = Bests { t: self.t_max, u: f32x8::ZERO, v: f32x8::ZERO, prim: u32x8::splat(EMPTY) };
+        let best = self.walk(bvh, best);
         let t = (best.t * self.from_scaled).to_array();
         let (u, v, prim) = (best.u.to_array(), best.v.to_array(), best.prim.to_array());
         std::array::from_fn(|i| {
@@ -234,18 +235,16 @@ impl<const K: usize> Packet<K> {
     /// Whether anything is on each ray, as bits.
     #[inline(always)]
     pub(super) fn any(&self, bvh: &Bvh) -> u32 {
-        let mut stopped = Stopped { t_max: self.t_max, blocked: f32x8::ZERO };
-        self.walk(bvh, &mut stopped);
-        stopped.blocked.to_bitmask()
+        self.walk(bvh, Stopped { t_max: self.t_max, blocked: f32x8::ZERO }).blocked.to_bitmask()
     }
 }
 
 /// What a walk is after.
-trait Found<const K: usize> {
+trait Found<const K: usize>: Sized {
     /// How far each ray is still of interest; NaN for one that is done.
     fn until(&self) -> f32x8;
     fn leaf(&mut self, p: &Packet<K>, leaf: &Tri4);
-    fn analytic(&mut self, p: &Packet<K>, shape: &Analytic);
+    fn analytic(self, p: &Packet<K>, shape: &Analytic) -> Self;
 }
 
 impl<const K: usize> Found<K> for Bests {
@@ -270,7 +269,7 @@ impl<const K: usize> Found<K> for Bests {
     }
 
     #[inline(never)]
-    fn analytic(&mut self, p: &Packet<K>, shape: &Analytic) {
+    fn analytic(mut self, p: &Packet<K>, shape: &Analytic) -> Self {
         for lane in 0..LANES {
             let (t, u, v) = (&mut self.t.as_mut_array()[lane], &mut self.u.as_mut_array()[lane], &mut self.v.as_mut_array()[lane]);
             let prim = &mut self.prim.as_mut_array()[lane];
@@ -278,6 +277,7 @@ impl<const K: usize> Found<K> for Bests {
             shape.closest(p.origin(lane), p.direction(lane), &mut best);
             (*t, *u, *v, *prim) = (best.t, best.u, best.v, best.prim);
         }
+        self
     }
 }
 
@@ -305,7 +305,7 @@ impl<const K: usize> Found<K> for Stopped {
     }
 
     #[inline(never)]
-    fn analytic(&mut self, p: &Packet<K>, shape: &Analytic) {
+    fn analytic(mut self, p: &Packet<K>, shape: &Analytic) -> Self {
         for lane in 0..LANES {
             let t_max = &mut self.t_max.as_mut_array()[lane];
             if shape.occluded(p.origin(lane), p.direction(lane), *t_max) {
@@ -313,5 +313,6 @@ impl<const K: usize> Found<K> for Stopped {
                 self.blocked.as_mut_array()[lane] = f32::from_bits(u32::MAX);
             }
         }
+        self
     }
 }
