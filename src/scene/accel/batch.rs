@@ -6,16 +6,19 @@
 
 use super::packet::{LANES, Packet, largest_axis};
 use super::{Bvh, RawHit, Ray};
+use glam::Vec3;
 
 /// Rays sorted at once; their numbers fit a byte.
 const BATCH: usize = 256;
 
 /// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
-const WAY: f32 = 0.25;
+const WAY: f32 = 1.0;
 
 /// How far apart they may start, in units of the scene's largest coordinate.
-const START: f32 = 0.05;
+const START: f32 = 0.2;
 
+const AROUND: f32 = 0.2;
+const ENOUGH: usize = 6;
 /// Leaves of a small tree.
 const SMALL: usize = 24;
 
@@ -62,36 +65,41 @@ impl Question for Any {
     }
 }
 
-/// The numbers of up to `BATCH` rays by largest axis, and where each axis ends.
+/// The numbers of up to `BATCH` rays by largest axis, on each axis by octant, and where each axis ends.
 #[inline(always)]
-fn by_axis(rays: &[Ray]) -> ([u8; BATCH], [usize; 3]) {
+fn by_direction(rays: &[Ray]) -> ([u8; BATCH], [usize; 3]) {
     let mut order = [0; BATCH];
-    let mut axes = [0u8; BATCH];
-    let mut counts = [0usize; 4];
-    for (axis, ray) in axes.iter_mut().zip(rays) {
-        *axis = largest_axis(ray.d) as u8;
-        counts[*axis as usize & 3] += 1;
+    let mut ways = [0u8; BATCH];
+    let mut next = [0usize; 32];
+    for (way, ray) in ways.iter_mut().zip(rays) {
+        *way = (largest_axis(ray.d) << 3 | octant(ray.d)) as u8;
+        next[*way as usize & 31] += 1;
     }
-    let mut next = [0, counts[0], counts[0] + counts[1], 0];
-    for (n, axis) in axes.iter().enumerate().take(rays.len()) {
-        let place = &mut next[*axis as usize & 3];
+    let mut sum = 0;
+    for place in &mut next {
+        (*place, sum) = (sum, sum + *place);
+    }
+    for (n, way) in ways.iter().enumerate().take(rays.len()) {
+        let place = &mut next[*way as usize & 31];
         order[*place & (BATCH - 1)] = n as u8;
         *place += 1;
     }
-    (order, [next[0], next[1], next[2]])
+    (order, [next[7], next[15], next[23]])
 }
 
-/// Do eight rays start close to each other and go nearly the same way? If so, their largest axis.
+/// The signs of a direction, as bits.
 #[inline(always)]
-fn together(rays: &[Ray], reach: f32) -> Option<usize> {
-    let [first, others @ ..] = rays else {
-        return None;
-    };
-    let (way, start) = (first.d.abs().max_element() * WAY, reach * START);
-    let near = |r: &Ray| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start;
+fn octant(d: Vec3) -> usize {
+    let sign = |x: f32| (x.to_bits() >> 31) as usize;
+    sign(d.x) << 2 | sign(d.y) << 1 | sign(d.z)
+}
+
+/// Do eight rays start close to each other and go nearly the same way?
+#[inline(always)]
+fn together<'a>(first: &Ray, mut others: impl Iterator<Item = &'a Ray>, way: f32, start: f32) -> bool {
+    let way = first.d.abs().max_element() * way;
     // The first neighbour already tells most strangers.
-    let axis = largest_axis(first.d);
-    (rays.len() == LANES && others.iter().all(near) && others.iter().all(|r| largest_axis(r.d) == axis)).then_some(axis)
+    others.all(|r| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start)
 }
 
 impl Bvh {
@@ -104,36 +112,36 @@ impl Bvh {
         }
     }
 
-    /// For a small tree: all rays in packets.
+    /// Up to `BATCH` rays in groups of eight by direction.
     #[inline(always)]
-    fn each_grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
-        for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            let (order, ends) = by_axis(rays);
-            let mut start = 0;
-            for (axis, end) in ends.into_iter().enumerate() {
-                for group in order[start..end].chunks(LANES) {
-                    if group.len() < LEAST {
-                        for &n in group {
-                            answers[n as usize] = Q::alone(self, &rays[n as usize]);
-                        }
-                        continue;
+    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], small: bool) {
+        let (order, ends) = by_direction(rays);
+        let mut start = 0;
+        for (axis, end) in ends.into_iter().enumerate() {
+            for group in order[start..end].chunks(LANES) {
+                let first = &rays[group[0] as usize];
+                if group.len() < LEAST || (!small && (group.len() < ENOUGH || !together(first, group.iter().map(|n| &rays[*n as usize]), WAY, self.reach * START))) {
+                    for &n in group {
+                        answers[n as usize] = Q::alone(self, &rays[n as usize]);
                     }
-                    // Lanes to spare do what the first does.
-                    let eight = std::array::from_fn(|i| &rays[*group.get(i).unwrap_or(&group[0]) as usize]);
-                    for (&n, answer) in group.iter().zip(self.packet::<Q>(eight, axis)) {
-                        answers[n as usize] = answer;
-                    }
+                    continue;
                 }
-                start = end;
+                // Lanes to spare do what the first does.
+                let eight = std::array::from_fn(|i| &rays[*group.get(i).unwrap_or(&group[0]) as usize]);
+                for (&n, answer) in group.iter().zip(self.packet::<Q>(eight, axis)) {
+                    answers[n as usize] = answer;
+                }
             }
+            start = end;
         }
     }
 
-    /// For a large tree: packets where neighbours go together.
+    /// Up to `BATCH` rays, in packets where neighbours go together.
     #[inline(always)]
-    fn each_in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+    fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
-            if let Some(axis) = together(rays, self.reach) {
+            let axis = largest_axis(rays[0].d);
+            if rays.len() == LANES && together(&rays[0], rays.iter(), WAY, self.reach * START) && rays.iter().all(|r| largest_axis(r.d) == axis) {
                 answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }
@@ -147,10 +155,15 @@ impl Bvh {
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
-        if self.triangles.len() + self.analytic.len() <= SMALL {
-            self.each_grouped::<Q>(rays, answers);
-        } else {
-            self.each_in_turn::<Q>(rays, answers);
+        let small = self.triangles.len() + self.analytic.len() <= SMALL;
+        for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
+            let n = rays.len();
+            let near = |i: usize| (rays[i].o - rays[0].o).abs().max_element() <= self.reach * AROUND;
+            if small || n >= 32 && near(n / 4) && near(n / 2) && near(n * 3 / 4) && near(n - 1) {
+                self.grouped::<Q>(rays, answers, small);
+            } else {
+                self.in_turn::<Q>(rays, answers);
+            }
         }
     }
 
