@@ -194,7 +194,11 @@ impl<const K: usize> Packet<K> {
                             break;
                         }
                         let (mask, enter) = self.meet(node, i, found.until());
-                        // Written in any case: whether a box is met by one ray of eight is hard to foretell.
+                        if bvh.large && !mask.any() {
+                            continue;
+                        }
+                        // Written in any case in a small tree: whether a box is met by one of eight rays that do not go together is hard to
+                        // foretell.
                         stack[top & (ENTRIES - 1)].set((mask.select(enter, f32x8::splat(f32::INFINITY)), child));
                         top += usize::from(mask.any());
                     }
