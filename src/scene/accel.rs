@@ -4,8 +4,10 @@
 //! stand in `docs/rays.md`.
 
 mod analytic;
+mod batch;
 mod build;
 mod node;
+mod packet;
 mod probe;
 mod traverse;
 mod tree;
@@ -129,5 +131,13 @@ impl Accel for Bvh {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.find_any(ray)
+    }
+
+    fn closest_each(&self, rays: &[Ray], hits: &mut [Option<RawHit>]) {
+        self.each_closest(rays, hits);
+    }
+
+    fn occluded_each(&self, rays: &[Ray], blocked: &mut [bool]) {
+        self.each_any(rays, blocked);
     }
 }

@@ -1,8 +1,7 @@
 //! Spheres, disks and cylinders: solved in f64, where an f32 origin and direction leave no rounding to fear.
 
-use super::probe::Probe;
 use super::triangle::Best;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
 
 /// One shape and its number.
 #[derive(Clone)]
@@ -34,8 +33,8 @@ fn roots(a: f64, h: f64, c: f64, discriminant: f64) -> Option<[f64; 2]> {
 impl Analytic {
     /// Hands `found` each crossing in order along the ray until it says stop.
     #[inline(always)]
-    fn crossings(&self, p: &Probe, mut found: impl FnMut(f64) -> bool) {
-        let (o, d) = (p.o.as_dvec3(), p.d.as_dvec3());
+    fn crossings(&self, o: Vec3, d: Vec3, mut found: impl FnMut(f64) -> bool) {
+        let (o, d) = (o.as_dvec3(), d.as_dvec3());
         match &self.shape {
             Shape::Sphere { center, radius2 } => {
                 let o = o - *center;
@@ -73,8 +72,8 @@ impl Analytic {
     }
 
     #[inline(never)]
-    pub(super) fn closest(&self, p: &Probe, best: &mut Best) {
-        self.crossings(p, |t| {
+    pub(super) fn closest(&self, o: Vec3, d: Vec3, best: &mut Best) {
+        self.crossings(o, d, |t| {
             let t = t as f32;
             let hit = t > 0.0 && t <= best.t;
             if hit {
@@ -85,9 +84,9 @@ impl Analytic {
     }
 
     #[inline(never)]
-    pub(super) fn occluded(&self, p: &Probe, t_max: f32) -> bool {
+    pub(super) fn occluded(&self, o: Vec3, d: Vec3, t_max: f32) -> bool {
         let mut hit = false;
-        self.crossings(p, |t| {
+        self.crossings(o, d, |t| {
             let t = t as f32;
             hit |= t > 0.0 && t <= t_max;
             hit

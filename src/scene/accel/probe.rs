@@ -9,15 +9,15 @@ use wide::f32x4;
 /// With `u = 2^-24`, the slab test errs by less than `4 u M` (`o * inv`, the widening, the multiply-add), and the triangle
 /// test moves a corner by less than `16 u M` (translation, shear, edge function). The sum of both, and some slack: a
 /// box is never missed when the triangle test of something inside would report a hit.
-const PAD: f32 = 32.0 / (1 << 24) as f32;
+pub(super) const PAD: f32 = 32.0 / (1 << 24) as f32;
 
 /// A direction component is never taken for less than this part of the largest one.
 ///
 /// It keeps the inverse finite. Over the scene's whole extent such a component moves the ray by far less than `PAD`.
-const FLATTEST: f32 = 1.0 / (1u64 << 36) as f32;
+pub(super) const FLATTEST: f32 = 1.0 / (1u64 << 36) as f32;
 
 /// The two axes that follow each, cyclically.
-const NEXT: [[usize; 2]; 4] = [[1, 2], [2, 0], [0, 1], [0, 1]];
+pub(super) const NEXT: [[usize; 2]; 4] = [[1, 2], [2, 0], [0, 1], [0, 1]];
 
 /// A ray ready for the tree. Its direction is scaled by a power of two so that the largest component lies in `[1, 2)`;
 /// inside the tree `t` is measured in that direction.

@@ -43,12 +43,11 @@ impl Bvh {
     /// See [`super::Accel::closest`].
     #[inline(always)]
     pub(super) fn find_closest(&self, ray: &Ray) -> Option<RawHit> {
-        STACK.with(|stack| self.closest_on(stack, ray))
+        STACK.with(|stack| self.closest_on(stack, &Probe::new(ray, self.reach)?, ray))
     }
 
     #[inline(always)]
-    fn closest_on(&self, stack: &[Cell<u64>; DEEP], ray: &Ray) -> Option<RawHit> {
-        let p = Probe::new(ray, self.reach)?;
+    fn closest_on(&self, stack: &[Cell<u64>; DEEP], p: &Probe, ray: &Ray) -> Option<RawHit> {
         let mut best = Best { t: ray.t_max * p.to_scaled, u: 0.0, v: 0.0, prim: EMPTY };
         let mut top = 0;
         let mut at = self.root;
@@ -56,7 +55,7 @@ impl Bvh {
             return None;
         }
         loop {
-            let p = in_memory(&p);
+            let p = in_memory(p);
             if at & LEAF == 0 {
                 let node = &self.nodes[at as usize];
                 let (mut mask, enter) = node.meet(p, best.t);
@@ -98,7 +97,7 @@ impl Bvh {
             } else if at & ANALYTIC == 0 {
                 self.triangles[(at & !LEAF) as usize].closest(p, &mut best);
             } else {
-                self.analytic[(at & !(LEAF | ANALYTIC)) as usize].closest(p, &mut best);
+                self.analytic[(at & !(LEAF | ANALYTIC)) as usize].closest(p.o, p.d, &mut best);
             }
             // A child entered no sooner than the best hit is not worth opening; equally near ones are, for the tie.
             loop {
@@ -125,14 +124,11 @@ impl Bvh {
     /// See [`super::Accel::occluded`].
     #[inline(always)]
     pub(super) fn find_any(&self, ray: &Ray) -> bool {
-        STACK.with(|stack| self.any_on(stack, ray))
+        STACK.with(|stack| Probe::new(ray, self.reach).is_some_and(|p| self.any_on(stack, &p, ray)))
     }
 
     #[inline(always)]
-    fn any_on(&self, stack: &[Cell<u64>; DEEP], ray: &Ray) -> bool {
-        let Some(p) = Probe::new(ray, self.reach) else {
-            return false;
-        };
+    fn any_on(&self, stack: &[Cell<u64>; DEEP], p: &Probe, ray: &Ray) -> bool {
         let t_max = ray.t_max * p.to_scaled;
         let mut top = 0;
         let mut at = self.root;
@@ -140,7 +136,7 @@ impl Bvh {
             return false;
         }
         loop {
-            let p = in_memory(&p);
+            let p = in_memory(p);
             if at & LEAF == 0 {
                 let node = &self.nodes[at as usize];
                 let (mut mask, _) = node.meet(p, t_max);
@@ -161,7 +157,7 @@ impl Bvh {
                 if self.triangles[(at & !LEAF) as usize].occluded(p, t_max) {
                     return true;
                 }
-            } else if self.analytic[(at & !(LEAF | ANALYTIC)) as usize].occluded(p, t_max) {
+            } else if self.analytic[(at & !(LEAF | ANALYTIC)) as usize].occluded(p.o, p.d, t_max) {
                 return true;
             }
             if top == 0 {

@@ -9,7 +9,7 @@ use wide::f32x4;
 
 /// Error of an edge function in units of the squared size of the triangle as seen from the origin: six roundings reach
 /// each of its four factors, two more its products; and all of that three times, once a corner.
-const DOUBTFUL: f32 = 64.0 / (1 << 24) as f32;
+pub(super) const DOUBTFUL: f32 = 64.0 / (1 << 24) as f32;
 
 /// Up to four triangles: three cache lines, one a corner. Absent ones are NaN throughout and never hit.
 #[derive(Clone)]
@@ -112,7 +112,7 @@ impl Tri4 {
             mask &= mask - 1;
             let mut t = four.t[lane];
             if four.doubtful >> lane & 1 != 0 {
-                t = self.exactly(p.o, p.d, lane, t);
+                t = exactly(p.o, p.d, self.corners(lane), t);
                 if t.is_nan() || t <= 0.0 {
                     continue;
                 }
@@ -131,7 +131,7 @@ impl Tri4 {
         }
         (0..4).any(|lane| {
             mask >> lane & 1 != 0 && {
-                let t = self.exactly(p.o, p.d, lane, four.t[lane]);
+                let t = exactly(p.o, p.d, self.corners(lane), four.t[lane]);
                 t > 0.0 && t <= t_max
             }
         })
@@ -143,28 +143,45 @@ impl Tri4 {
         self.corner.iter().for_each(fetch);
     }
 
+    /// The number of the triangle in a lane.
     #[inline(always)]
-    fn number(&self, lane: usize) -> u32 {
-        self.corner[0][3].as_array()[lane].to_bits()
+    pub(super) fn number(&self, lane: usize) -> u32 {
+        self.corner[0][3].as_array()[lane & 3].to_bits()
     }
 
-    fn at(&self, corner: usize, lane: usize) -> DVec3 {
-        let c = &self.corner[corner];
-        let [x, y, z] = [0, 1, 2].map(|axis: usize| f64::from(c[axis].as_array()[lane]));
-        DVec3::new(x, y, z)
+    /// One coordinate of a corner of the triangle in a lane.
+    #[inline(always)]
+    pub(super) fn coordinate(&self, corner: usize, axis: usize, lane: usize) -> f32 {
+        self.corner[corner][axis & 3].as_array()[lane & 3]
     }
 
-    /// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
-    /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
-    #[cold]
-    #[inline(never)]
-    fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
-        let a = self.at(0, lane);
-        let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
-        let along = n.dot(d.as_dvec3());
-        if along == 0.0 {
-            return t;
-        }
-        (n.dot(a - o.as_dvec3()) / along) as f32
+    /// How many triangles there are; they fill the first lanes.
+    #[inline(always)]
+    pub(super) fn count(&self) -> usize {
+        let x = self.corner[0][0];
+        x.simd_eq(x).to_bitmask().count_ones() as usize
     }
+
+    /// The corners of the triangle in a lane.
+    pub(super) fn corners(&self, lane: usize) -> [DVec3; 3] {
+        [0, 1, 2].map(|corner| {
+            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.coordinate(corner, axis, lane)));
+            DVec3::new(x, y, z)
+        })
+    }
+}
+
+/// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
+/// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
+#[cold]
+#[inline(never)]
+pub(super) fn exactly(o: Vec3, d: Vec3, [a, b, c]: [DVec3; 3], t: f32) -> f32 {
+    let n = (b - a).cross(c - a);
+    let along = n.dot(d.as_dvec3());
+    if along == 0.0 {
+        return t;
+    }
+    let ahead = n.dot(a - o.as_dvec3());
+    // Most often the ray leaves this triangle: that needs no quotient.
+    if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
 }
