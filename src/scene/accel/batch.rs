@@ -120,7 +120,10 @@ impl Bvh {
         for (axis, end) in ends.into_iter().enumerate() {
             for group in order[start..end].chunks(LANES) {
                 let first = &rays[group[0] as usize];
-                if group.len() < LEAST || (!small && (group.len() < ENOUGH || !together(first, group.iter().map(|n| &rays[*n as usize]), WAY, self.reach * START))) {
+                if group.len() < LEAST
+                    || (!small
+                        && (group.len() < ENOUGH || !together(first, group.iter().map(|n| &rays[*n as usize]), WAY, self.reach * START)))
+                {
                     for &n in group {
                         answers[n as usize] = Q::alone(self, &rays[n as usize]);
                     }
@@ -141,7 +144,10 @@ impl Bvh {
     fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
             let axis = largest_axis(rays[0].d);
-            if rays.len() == LANES && together(&rays[0], rays.iter(), WAY, self.reach * START) && rays.iter().all(|r| largest_axis(r.d) == axis) {
+            if rays.len() == LANES
+                && together(&rays[0], rays.iter(), WAY, self.reach * START)
+                && rays.iter().all(|r| largest_axis(r.d) == axis)
+            {
                 answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }

@@ -56,7 +56,8 @@ impl Tri4 {
         Self { corner }
     }
 
-    /// Which lanes the ray hits with `t <= t_max`, as bits; a lane marked doubtful may have `t <= 0`.
+    /// Which lanes the ray hits with `0 < t <= t_max`, as bits; of a lane marked doubtful `t` is still to be found exactly. Its f32 value
+    /// must not even turn it down, or which of two triangles around the origin wins would depend on which was met first.
     #[inline(always)]
     fn four(&self, p: &Probe, t_max: f32) -> Option<(u32, Four)> {
         let [x, y, z] = p.axis.map(|k| k & 3);
@@ -94,7 +95,7 @@ impl Tri4 {
         let large = deep.fast_max(most(ax, bx, cx)).fast_max(most(ay, by, cy));
         let weight = large * large * scale.abs() * f32x4::splat(DOUBTFUL);
         let doubtful = depth.abs().simd_le(weight * deep);
-        let hit = inside & (doubtful | t.simd_gt(zero)) & t.simd_le(f32x4::splat(t_max));
+        let hit = inside & (doubtful | (t.simd_gt(zero) & t.simd_le(f32x4::splat(t_max))));
         let mask = hit.to_bitmask();
         (mask != 0).then(|| {
             let four = Four { t: t.to_array(), u: u.to_array(), v: v.to_array(), doubtful: doubtful.to_bitmask() };
