@@ -68,7 +68,7 @@ fn any_number_of_any_rays_in_any_tree() {
                     hits += agree(&bvh, &cone(length, width, &mut rng));
                 }
             }
-            assert!(count < 7 || hits > 1000, "{hits} hits of {count} primitives");
+            assert!(hits >= 10 * count.min(20), "{hits} hits of {count} primitives");
         }
     }
 }
@@ -123,6 +123,40 @@ fn of_coincident_triangles_the_first_wins() {
             bvh.closest_each(&rays, &mut hits);
             assert!(hits.iter().flatten().all(|h| h.prim < 3), "a copy won over the first");
         }
+    }
+}
+
+/// A triangle seen exactly edge-on may claim a ray that passes beside it. Alone this ray never asks the triangle, whose box it misses; in
+/// company of rays that do it must not either.
+#[test]
+fn a_ray_finds_nothing_where_others_lead_it() {
+    let v = Vec3::new;
+    let list = [
+        [v(1.0, -1.0, 1.0), v(0.0, 0.0, 0.5), v(0.0, 0.5, -1.0)],
+        [v(0.0, 0.0, -1.0), v(-0.5, 1.0, 1.0), v(0.0, -0.5, 0.5)],
+        [v(0.5, 0.0, -0.5), v(1.0, -0.5, 0.0), v(-0.5, 1.0, -0.5)],
+        [v(-0.5, -0.5, 0.5), v(1.0, 0.0, -0.5), v(0.5, 1.0, 0.5)],
+        [v(-1.0, 1.0, 0.5), v(0.0, 0.5, 0.5), v(0.5, 0.0, -0.5)],
+        [v(-0.5, 0.5, 1.0), v(-1.0, 0.5, 0.0), v(0.5, 0.5, -1.0)],
+        [v(0.0, -0.5, 0.5), v(0.0, 0.0, 1.0), v(0.0, -0.5, 0.0)],
+        [v(-0.5, 1.0, 0.0), v(0.0, 0.0, -0.5), v(-1.0, 1.0, 0.0)],
+        [v(0.0, 0.5, -0.5), v(-0.5, 0.5, 0.5), v(0.0, -1.0, 0.0)],
+        [v(-0.5, 0.0, -0.5), v(0.0, 1.0, 0.5), v(0.0, 0.5, -1.0)],
+        [v(-0.5, -1.0, 1.0), v(-1.0, 0.5, -0.5), v(-0.5, -1.0, -1.0)],
+        [v(0.5, 0.5, 0.5), v(-0.5, 1.0, -0.5), v(0.5, 1.0, 0.0)],
+    ];
+    let bvh = Bvh::build(&list.map(Primitive::Triangle));
+    let beside = Ray::new(v(-0.5, -0.5, 1.0), v(-1.0, 1.0, -1.5));
+    assert_eq!(bvh.closest(&beside), None);
+    let mut rng = rng(26);
+    for _ in 0..100 {
+        let mut rays = vec![beside; 8];
+        for ray in &mut rays[1..] {
+            let at = v(0.17, 0.83, 0.0) + point(&mut rng) * 0.1;
+            ray.d = beside.d + point(&mut rng) * 0.3;
+            ray.o = at - ray.d;
+        }
+        agree(&bvh, &rays);
     }
 }
 

@@ -1,8 +1,9 @@
 //! Many rays at once: which go together, and how.
 //!
-//! In a small tree any eight rays visit nearly the same leaves: rays are taken 256 at a time and grouped by their largest axis, as a packet
-//! needs it. In a larger one only rays that start close to each other and go nearly the same way gain by company: eight neighbours in the
-//! list form a packet if they do, and otherwise each goes alone.
+//! In a small tree any eight rays visit nearly the same leaves, so all go in packets. In a larger one rays gain by company only if they start
+//! close to each other and go roughly the same way; the others go alone, one after the other. Rays from about one place, such as
+//! those that have just left the surfaces that neighbouring pixels see, are sorted by direction first; of others only neighbours in the
+//! list are looked at, since sorting costs more than the few packets it would find. What is decided here changes no answer.
 
 use super::packet::{LANES, Packet, largest_axis};
 use super::{Bvh, RawHit, Ray};
@@ -11,19 +12,20 @@ use glam::Vec3;
 /// Rays sorted at once; their numbers fit a byte.
 const BATCH: usize = 256;
 
+/// Leaves of a small tree.
+const SMALL: usize = 48;
+
+/// Rays that make a packet, in a small tree and in a larger one.
+const ENOUGH: [usize; 2] = [3, 6];
+
 /// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
 const WAY: f32 = 1.0;
 
-/// How far apart they may start, in units of the scene's largest coordinate.
-const START: f32 = 0.2;
+/// How far apart they may start, in units of the scene's longest side. Rays of a batch that do not are not from one place.
+const START: f32 = 0.1;
 
-const AROUND: f32 = 0.2;
-const ENOUGH: usize = 6;
-/// Leaves of a small tree.
-const SMALL: usize = 24;
-
-/// Fewer rays than this go alone.
-const LEAST: usize = 3;
+/// Rays below which a batch for a larger tree is not worth sorting.
+const SORTED: usize = 32;
 
 /// What is asked of each ray.
 trait Question {
@@ -94,12 +96,24 @@ fn octant(d: Vec3) -> usize {
     sign(d.x) << 2 | sign(d.y) << 1 | sign(d.z)
 }
 
-/// Do eight rays start close to each other and go nearly the same way?
+/// Do all start close to the first and go roughly its way?
 #[inline(always)]
-fn together<'a>(first: &Ray, mut others: impl Iterator<Item = &'a Ray>, way: f32, start: f32) -> bool {
-    let way = first.d.abs().max_element() * way;
+fn together<'a>(first: &Ray, mut others: impl Iterator<Item = &'a Ray>, start: f32) -> bool {
+    let way = first.d.abs().max_element() * WAY;
     // The first neighbour already tells most strangers.
-    others.all(|r| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start)
+    others.all(|r| (r.d - first.d).abs().max_element() <= way && close(first, r, start))
+}
+
+#[inline(always)]
+fn close(a: &Ray, b: &Ray, start: f32) -> bool {
+    (a.o - b.o).abs().max_element() <= start
+}
+
+/// Do samples of the list start close to each other?
+#[inline(always)]
+fn from_one_place(rays: &[Ray], start: f32) -> bool {
+    let n = rays.len();
+    n >= SORTED && [n / 4, n / 2, n * 3 / 4, n - 1].iter().all(|&i| close(&rays[0], &rays[i], start))
 }
 
 impl Bvh {
@@ -112,18 +126,14 @@ impl Bvh {
         }
     }
 
-    /// Up to `BATCH` rays in groups of eight by direction.
+    /// Up to `BATCH` rays by direction, in packets where eight of them fit.
     #[inline(always)]
-    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], small: bool) {
+    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], fit: impl Fn(&[u8]) -> bool) {
         let (order, ends) = by_direction(rays);
         let mut start = 0;
         for (axis, end) in ends.into_iter().enumerate() {
             for group in order[start..end].chunks(LANES) {
-                let first = &rays[group[0] as usize];
-                if group.len() < LEAST
-                    || (!small
-                        && (group.len() < ENOUGH || !together(first, group.iter().map(|n| &rays[*n as usize]), WAY, self.reach * START)))
-                {
+                if !fit(group) {
                     for &n in group {
                         answers[n as usize] = Q::alone(self, &rays[n as usize]);
                     }
@@ -141,13 +151,10 @@ impl Bvh {
 
     /// Up to `BATCH` rays, in packets where neighbours go together.
     #[inline(always)]
-    fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+    fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], start: f32) {
         for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
             let axis = largest_axis(rays[0].d);
-            if rays.len() == LANES
-                && together(&rays[0], rays.iter(), WAY, self.reach * START)
-                && rays.iter().all(|r| largest_axis(r.d) == axis)
-            {
+            if rays.len() == LANES && together(&rays[0], rays.iter(), start) && rays.iter().all(|r| largest_axis(r.d) == axis) {
                 answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }
@@ -157,18 +164,21 @@ impl Bvh {
         }
     }
 
+    /// Of two lengths the shorter counts.
     #[inline(always)]
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
         let small = self.triangles.len() + self.analytic.len() <= SMALL;
+        let start = self.bounds.map_or(0.0, |b| (b.max - b.min).max_element()) * START;
         for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            let n = rays.len();
-            let near = |i: usize| (rays[i].o - rays[0].o).abs().max_element() <= self.reach * AROUND;
-            if small || n >= 32 && near(n / 4) && near(n / 2) && near(n * 3 / 4) && near(n - 1) {
-                self.grouped::<Q>(rays, answers, small);
+            if small {
+                self.grouped::<Q>(rays, answers, |group| group.len() >= ENOUGH[0]);
+            } else if from_one_place(rays, start) {
+                let of = |n: &u8| &rays[*n as usize];
+                self.grouped::<Q>(rays, answers, |group| group.len() >= ENOUGH[1] && together(of(&group[0]), group.iter().map(of), start));
             } else {
-                self.in_turn::<Q>(rays, answers);
+                self.in_turn::<Q>(rays, answers, start);
             }
         }
     }
