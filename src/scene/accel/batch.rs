@@ -1,9 +1,8 @@
 //! Many rays at once: which go together, and how.
 //!
-//! In a small tree any eight rays visit nearly the same leaves, so all go in packets. In a larger one rays gain by company only if they start
-//! close to each other and go roughly the same way; the others go alone, one after the other. Rays from about one place, such as
-//! those that have just left the surfaces that neighbouring pixels see, are sorted by direction first; of others only neighbours in the
-//! list are looked at, since sorting costs more than the few packets it would find. What is decided here changes no answer.
+//! In a small tree any eight rays visit nearly the same leaves, so all go in packets, sorted by direction. In a larger one rays gain by
+//! company only if they start close to each other and go nearly the same way: eight neighbours in the list form a packet if they do, and
+//! otherwise each goes alone. What is decided here changes no answer.
 
 use super::packet::{LANES, Packet, largest_axis};
 use super::{Bvh, RawHit, Ray};
@@ -15,17 +14,14 @@ const BATCH: usize = 256;
 /// Leaves of a small tree.
 const SMALL: usize = 48;
 
-/// Rays that make a packet, in a small tree and in a larger one.
-const ENOUGH: [usize; 2] = [3, 6];
+/// Rays that make a packet in a small tree.
+const ENOUGH: usize = 3;
 
 /// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
-const WAY: f32 = 1.0;
+const WAY: f32 = 0.25;
 
-/// How far apart they may start, in units of the scene's longest side. Rays of a batch that do not are not from one place.
-const START: f32 = 0.1;
-
-/// Rays below which a batch for a larger tree is not worth sorting.
-const SORTED: usize = 32;
+/// How far apart they may start, in units of the scene's longest side.
+const START: f32 = 0.05;
 
 /// What is asked of each ray.
 trait Question {
@@ -96,24 +92,16 @@ fn octant(d: Vec3) -> usize {
     sign(d.x) << 2 | sign(d.y) << 1 | sign(d.z)
 }
 
-/// Do all start close to the first and go roughly its way?
+/// Do eight rays start close to each other and go nearly the same way? If so, their largest axis.
 #[inline(always)]
-fn together<'a>(first: &Ray, mut others: impl Iterator<Item = &'a Ray>, start: f32) -> bool {
-    let way = first.d.abs().max_element() * WAY;
+fn together(rays: &[Ray], start: f32) -> Option<usize> {
+    let [first, others @ ..] = rays else {
+        return None;
+    };
+    let (axis, way) = (largest_axis(first.d), first.d.abs().max_element() * WAY);
     // The first neighbour already tells most strangers.
-    others.all(|r| (r.d - first.d).abs().max_element() <= way && close(first, r, start))
-}
-
-#[inline(always)]
-fn close(a: &Ray, b: &Ray, start: f32) -> bool {
-    (a.o - b.o).abs().max_element() <= start
-}
-
-/// Do samples of the list start close to each other?
-#[inline(always)]
-fn from_one_place(rays: &[Ray], start: f32) -> bool {
-    let n = rays.len();
-    n >= SORTED && [n / 4, n / 2, n * 3 / 4, n - 1].iter().all(|&i| close(&rays[0], &rays[i], start))
+    let near = |r: &Ray| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start;
+    (rays.len() == LANES && others.iter().all(|r| near(r) && largest_axis(r.d) == axis)).then_some(axis)
 }
 
 impl Bvh {
@@ -126,14 +114,14 @@ impl Bvh {
         }
     }
 
-    /// Up to `BATCH` rays by direction, in packets where eight of them fit.
+    /// Up to `BATCH` rays by direction, in packets.
     #[inline(always)]
-    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], fit: impl Fn(&[u8]) -> bool) {
+    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let (order, ends) = by_direction(rays);
         let mut start = 0;
         for (axis, end) in ends.into_iter().enumerate() {
             for group in order[start..end].chunks(LANES) {
-                if !fit(group) {
+                if group.len() < ENOUGH {
                     for &n in group {
                         answers[n as usize] = Q::alone(self, &rays[n as usize]);
                     }
@@ -149,12 +137,11 @@ impl Bvh {
         }
     }
 
-    /// Up to `BATCH` rays, in packets where neighbours go together.
+    /// All rays in their order, in packets where neighbours go together.
     #[inline(always)]
     fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], start: f32) {
         for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
-            let axis = largest_axis(rays[0].d);
-            if rays.len() == LANES && together(&rays[0], rays.iter(), start) && rays.iter().all(|r| largest_axis(r.d) == axis) {
+            if let Some(axis) = together(rays, start) {
                 answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }
@@ -169,17 +156,12 @@ impl Bvh {
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
-        let small = self.triangles.len() + self.analytic.len() <= SMALL;
-        let start = self.bounds.map_or(0.0, |b| (b.max - b.min).max_element()) * START;
+        if self.triangles.len() + self.analytic.len() > SMALL {
+            let start = self.bounds.map_or(0.0, |b| (b.max - b.min).max_element()) * START;
+            return self.in_turn::<Q>(rays, answers, start);
+        }
         for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            if small {
-                self.grouped::<Q>(rays, answers, |group| group.len() >= ENOUGH[0]);
-            } else if from_one_place(rays, start) {
-                let of = |n: &u8| &rays[*n as usize];
-                self.grouped::<Q>(rays, answers, |group| group.len() >= ENOUGH[1] && together(of(&group[0]), group.iter().map(of), start));
-            } else {
-                self.in_turn::<Q>(rays, answers, start);
-            }
+            self.grouped::<Q>(rays, answers);
         }
     }
 

@@ -8,7 +8,7 @@
 use super::analytic::Analytic;
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::probe::{FLATTEST, NEXT, PAD};
-use super::triangle::{Best, DOUBTFUL, Tri4, exactly};
+use super::triangle::{Best, DOUBTFUL, Tri4};
 use super::{Bvh, DEEP, RawHit, Ray};
 use glam::Vec3;
 use std::cell::Cell;
@@ -161,10 +161,9 @@ impl<const K: usize> Packet<K> {
     #[cold]
     #[inline(never)]
     fn exactly(&self, leaf: &Tri4, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
-        let corners = leaf.corners(n);
         for lane in lanes(mask) {
             let t = &mut t.as_mut_array()[lane];
-            *t = exactly(self.origin(lane), self.direction(lane), corners, *t);
+            *t = leaf.exactly(self.origin(lane), self.direction(lane), n, *t);
         }
         t
     }
@@ -190,8 +189,11 @@ impl<const K: usize> Packet<K> {
                             break;
                         }
                         let (mask, enter) = self.meet(node, i, found.until());
-                        if bvh.large && !mask.any() {
-                            continue;
+                        if bvh.large {
+                            if !mask.any() {
+                                continue;
+                            }
+                            bvh.fetch(child);
                         }
                         // Written in any case in a small tree: whether a box is met by one of eight rays that do not go together is hard to
                         // foretell.

@@ -113,7 +113,7 @@ impl Tri4 {
             mask &= mask - 1;
             let mut t = four.t[lane];
             if four.doubtful >> lane & 1 != 0 {
-                t = exactly(p.o, p.d, self.corners(lane), t);
+                t = self.exactly(p.o, p.d, lane, t);
                 if t.is_nan() || t <= 0.0 {
                     continue;
                 }
@@ -132,7 +132,7 @@ impl Tri4 {
         }
         (0..4).any(|lane| {
             mask >> lane & 1 != 0 && {
-                let t = exactly(p.o, p.d, self.corners(lane), four.t[lane]);
+                let t = self.exactly(p.o, p.d, lane, four.t[lane]);
                 t > 0.0 && t <= t_max
             }
         })
@@ -163,26 +163,25 @@ impl Tri4 {
         x.simd_eq(x).to_bitmask().count_ones() as usize
     }
 
-    /// The corners of the triangle in a lane.
-    pub(super) fn corners(&self, lane: usize) -> [DVec3; 3] {
-        [0, 1, 2].map(|corner| {
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.coordinate(corner, axis, lane)));
-            DVec3::new(x, y, z)
-        })
+    #[inline(always)]
+    fn at(&self, corner: usize, lane: usize) -> DVec3 {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| f64::from(self.coordinate(corner, axis, lane)));
+        DVec3::new(x, y, z)
     }
-}
 
-/// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
-/// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
-#[cold]
-#[inline(never)]
-pub(super) fn exactly(o: Vec3, d: Vec3, [a, b, c]: [DVec3; 3], t: f32) -> f32 {
-    let n = (b - a).cross(c - a);
-    let along = n.dot(d.as_dvec3());
-    if along == 0.0 {
-        return t;
+    /// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
+    /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
+        let a = self.at(0, lane);
+        let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
+        let along = n.dot(d.as_dvec3());
+        if along == 0.0 {
+            return t;
+        }
+        let ahead = n.dot(a - o.as_dvec3());
+        // Most often the ray leaves this triangle: that needs no quotient.
+        if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
     }
-    let ahead = n.dot(a - o.as_dvec3());
-    // Most often the ray leaves this triangle: that needs no quotient.
-    if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
 }
