@@ -4,10 +4,12 @@ pub mod distribution;
 pub mod elementary;
 pub mod frame;
 pub mod measure;
+mod memory;
 pub mod rgb;
 pub mod statistics;
 pub mod warp;
 
 pub use frame::Frame;
 pub use measure::{AreaPdf, SolidAnglePdf};
+pub use memory::fetch;
 pub use rgb::Rgb;

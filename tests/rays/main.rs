@@ -2,6 +2,7 @@
 
 mod cracks;
 mod limits;
+mod many;
 mod oracle;
 mod scaling;
 mod shapes;

@@ -1,8 +1,8 @@
 //! Many rays at once: which go together, and how.
 //!
-//! In a small tree any eight rays visit nearly the same leaves: rays are taken 256 at a time and grouped by their largest axis, as a packet
-//! needs it. In a larger one only rays that start close to each other and go nearly the same way gain by company: eight neighbours in the
-//! list form a packet if they do, and otherwise each goes alone.
+//! In a small tree any eight rays visit nearly the same leaves, so all go in packets, sorted by direction. In a larger one rays gain by
+//! company only if they start close to each other and go nearly the same way: eight neighbours in the list form a packet if they do, and
+//! otherwise each goes alone. What is decided here changes no answer.
 
 use super::packet::{LANES, Packet, largest_axis};
 use super::{Bvh, RawHit, Ray};
@@ -11,19 +11,17 @@ use glam::Vec3;
 /// Rays sorted at once; their numbers fit a byte.
 const BATCH: usize = 256;
 
-/// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
-const WAY: f32 = 1.0;
-
-/// How far apart they may start, in units of the scene's largest coordinate.
-const START: f32 = 0.2;
-
-const AROUND: f32 = 0.2;
-const ENOUGH: usize = 6;
 /// Leaves of a small tree.
-const SMALL: usize = 24;
+const SMALL: usize = 48;
 
-/// Fewer rays than this go alone.
-const LEAST: usize = 3;
+/// Rays that make a packet in a small tree.
+const ENOUGH: usize = 3;
+
+/// How far apart two rays of a packet in a larger tree may point, in units of the largest direction component.
+const WAY: f32 = 0.25;
+
+/// How far apart they may start, in units of the scene's longest side.
+const START: f32 = 0.05;
 
 /// What is asked of each ray.
 trait Question {
@@ -94,12 +92,16 @@ fn octant(d: Vec3) -> usize {
     sign(d.x) << 2 | sign(d.y) << 1 | sign(d.z)
 }
 
-/// Do eight rays start close to each other and go nearly the same way?
+/// Do eight rays start close to each other and go nearly the same way? If so, their largest axis.
 #[inline(always)]
-fn together<'a>(first: &Ray, mut others: impl Iterator<Item = &'a Ray>, way: f32, start: f32) -> bool {
-    let way = first.d.abs().max_element() * way;
+fn together(rays: &[Ray], start: f32) -> Option<usize> {
+    let [first, others @ ..] = rays else {
+        return None;
+    };
+    let (axis, way) = (largest_axis(first.d), first.d.abs().max_element() * WAY);
     // The first neighbour already tells most strangers.
-    others.all(|r| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start)
+    let near = |r: &Ray| (r.d - first.d).abs().max_element() <= way && (r.o - first.o).abs().max_element() <= start;
+    (rays.len() == LANES && others.iter().all(|r| near(r) && largest_axis(r.d) == axis)).then_some(axis)
 }
 
 impl Bvh {
@@ -112,15 +114,14 @@ impl Bvh {
         }
     }
 
-    /// Up to `BATCH` rays in groups of eight by direction.
+    /// Up to `BATCH` rays by direction, in packets.
     #[inline(always)]
-    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], small: bool) {
+    fn grouped<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let (order, ends) = by_direction(rays);
         let mut start = 0;
         for (axis, end) in ends.into_iter().enumerate() {
             for group in order[start..end].chunks(LANES) {
-                let first = &rays[group[0] as usize];
-                if group.len() < LEAST || (!small && (group.len() < ENOUGH || !together(first, group.iter().map(|n| &rays[*n as usize]), WAY, self.reach * START))) {
+                if group.len() < ENOUGH {
                     for &n in group {
                         answers[n as usize] = Q::alone(self, &rays[n as usize]);
                     }
@@ -136,12 +137,11 @@ impl Bvh {
         }
     }
 
-    /// Up to `BATCH` rays, in packets where neighbours go together.
+    /// All rays in their order, in packets where neighbours go together.
     #[inline(always)]
-    fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
+    fn in_turn<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer], start: f32) {
         for (rays, answers) in rays.chunks(LANES).zip(answers.chunks_mut(LANES)) {
-            let axis = largest_axis(rays[0].d);
-            if rays.len() == LANES && together(&rays[0], rays.iter(), WAY, self.reach * START) && rays.iter().all(|r| largest_axis(r.d) == axis) {
+            if let Some(axis) = together(rays, start) {
                 answers.copy_from_slice(&self.packet::<Q>(std::array::from_fn(|i| &rays[i]), axis));
                 continue;
             }
@@ -151,19 +151,17 @@ impl Bvh {
         }
     }
 
+    /// Of two lengths the shorter counts.
     #[inline(always)]
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
-        let small = self.triangles.len() + self.analytic.len() <= SMALL;
+        if self.triangles.len() + self.analytic.len() > SMALL {
+            let start = self.bounds.map_or(0.0, |b| (b.max - b.min).max_element()) * START;
+            return self.in_turn::<Q>(rays, answers, start);
+        }
         for (rays, answers) in rays.chunks(BATCH).zip(answers.chunks_mut(BATCH)) {
-            let n = rays.len();
-            let near = |i: usize| (rays[i].o - rays[0].o).abs().max_element() <= self.reach * AROUND;
-            if small || n >= 32 && near(n / 4) && near(n / 2) && near(n * 3 / 4) && near(n - 1) {
-                self.grouped::<Q>(rays, answers, small);
-            } else {
-                self.in_turn::<Q>(rays, answers);
-            }
+            self.grouped::<Q>(rays, answers);
         }
     }
 

@@ -1,6 +1,7 @@
 //! One node of the tree: eight boxes side by side.
 
 use super::probe::Probe;
+use crate::math::fetch;
 use wide::f32x8;
 
 /// A child that is a leaf: the rest is the place in its list.
@@ -9,15 +10,6 @@ pub(super) const LEAF: u32 = 1 << 31;
 pub(super) const ANALYTIC: u32 = 1 << 30;
 /// A child that is not there, and the root of a tree of nothing.
 pub(super) const EMPTY: u32 = u32::MAX;
-
-/// Asks for the cache line at `at`, where the processor has a way to ask.
-#[inline(always)]
-pub(super) fn fetch<T>(at: &T) {
-    #[cfg(target_arch = "x86_64")]
-    safe_arch::prefetch_t0(at);
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = at;
-}
 
 /// Eight children, four cache lines. Planes `[lower, upper]` per axis; missing children have `[inf, -inf]`.
 #[derive(Clone)]

@@ -8,7 +8,7 @@
 use super::analytic::Analytic;
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::probe::{FLATTEST, NEXT, PAD};
-use super::triangle::{Best, DOUBTFUL, Tri4, exactly};
+use super::triangle::{Best, DOUBTFUL, Tri4};
 use super::{Bvh, DEEP, RawHit, Ray};
 use glam::Vec3;
 use std::cell::Cell;
@@ -20,7 +20,7 @@ pub(super) const LANES: usize = 8;
 const ENTRIES: usize = 2 * DEEP;
 
 thread_local! {
-    /// Where each ray enters what is still to be visited, infinity for those that miss it.
+    /// Where each ray enters what is still to be visited, NaN for those that miss it.
     static STACK: [Cell<(f32x8, u32)>; ENTRIES] = const { [const { Cell::new((f32x8::ZERO, EMPTY)) }; ENTRIES] };
 }
 
@@ -125,9 +125,9 @@ impl<const K: usize> Packet<K> {
         (enter.simd_le(leave), enter)
     }
 
-    /// Which rays hit triangle `n` of a leaf with `t <= t_max`, and `t`, `u`, `v`: the operations of `Tri4::four`.
+    /// Which of the active rays hit triangle `n` of a leaf with `0 < t <= t_max`, and `t`, `u`, `v`: the operations of `Tri4::four`.
     #[inline(always)]
-    fn hits(&self, leaf: &Tri4, n: usize, t_max: f32x8) -> Option<(f32x8, [f32x8; 3])> {
+    fn hits(&self, leaf: &Tri4, n: usize, active: f32x8, t_max: f32x8) -> Option<(f32x8, [f32x8; 3])> {
         let moved = |corner: usize| {
             let at = |k: usize| f32x8::splat(leaf.coordinate(corner, k, n)) + self.minus_o[k];
             let z = at(K);
@@ -140,7 +140,7 @@ impl<const K: usize> Packet<K> {
         let b = ax * cy - ay * cx;
         let c = bx * ay - by * ax;
         let zero = f32x8::ZERO;
-        let inside = a.fast_min(b).fast_min(c).simd_ge(zero) | a.fast_max(b).fast_max(c).simd_le(zero);
+        let inside = (a.fast_min(b).fast_min(c).simd_ge(zero) | a.fast_max(b).fast_max(c).simd_le(zero)) & active;
         if !inside.any() {
             return None;
         }
@@ -153,36 +153,31 @@ impl<const K: usize> Packet<K> {
         let deep = most(az, bz, cz);
         let large = deep.fast_max(most(ax, bx, cx)).fast_max(most(ay, by, cy));
         let weight = large * large * scale.abs() * f32x8::splat(DOUBTFUL);
-        let near = inside & t.simd_le(t_max);
-        let doubtful = near & depth.abs().simd_le(weight * deep);
-        if doubtful.any() {
-            let t = self.exactly(leaf, n, doubtful.to_bitmask(), t);
-            return Some((near & t.simd_gt(zero) & t.simd_le(t_max), [t, u, v]));
-        }
-        Some((near & t.simd_gt(zero), [t, u, v]))
+        let doubtful = inside & depth.abs().simd_le(weight * deep);
+        let t = if doubtful.any() { self.exactly(leaf, n, doubtful.to_bitmask(), t) } else { t };
+        Some((inside & t.simd_gt(zero) & t.simd_le(t_max), [t, u, v]))
     }
 
     #[cold]
     #[inline(never)]
-    fn exactly(&self, leaf: &Tri4, n: usize, mut mask: u32, mut t: f32x8) -> f32x8 {
-        let corners = leaf.corners(n);
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize & (LANES - 1);
-            mask &= mask - 1;
+    fn exactly(&self, leaf: &Tri4, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
+        for lane in lanes(mask) {
             let t = &mut t.as_mut_array()[lane];
-            *t = exactly(self.origin(lane), self.direction(lane), corners, *t);
+            *t = leaf.exactly(self.origin(lane), self.direction(lane), n, *t);
         }
         t
     }
 
-    /// The walk, front or back first as it comes: `open` says which rays are still in question up to which `t`, `leaf` and `analytic` look
-    /// for hits and say whether to go on.
+    /// The walk: largest child first, whatever its distance; to sort children for eight rays costs more than it saves.
     #[inline(always)]
     fn walk<F: Found<K>>(&self, bvh: &Bvh, mut found: F) -> F {
         // By value, in and out: as long as nobody has its address, it can stay in registers.
         STACK.with(move |stack| {
             let mut top = 0;
             let mut at = bvh.root;
+            // The rays whose own box test led here. One that only comes along in its lane must find nothing: seen exactly edge-on, a
+            // triangle may claim a ray that passes beside it, and alone the ray would never have asked.
+            let mut active = found.until().simd_gt(f32x8::ZERO);
             if at == EMPTY {
                 return found;
             }
@@ -194,18 +189,21 @@ impl<const K: usize> Packet<K> {
                             break;
                         }
                         let (mask, enter) = self.meet(node, i, found.until());
-                        if bvh.large && !mask.any() {
-                            continue;
+                        if bvh.large {
+                            if !mask.any() {
+                                continue;
+                            }
+                            bvh.fetch(child);
                         }
                         // Written in any case in a small tree: whether a box is met by one of eight rays that do not go together is hard to
                         // foretell.
-                        stack[top & (ENTRIES - 1)].set((mask.select(enter, f32x8::splat(f32::INFINITY)), child));
+                        stack[top & (ENTRIES - 1)].set((mask.select(enter, f32x8::splat(f32::NAN)), child));
                         top += usize::from(mask.any());
                     }
                 } else if at & ANALYTIC == 0 {
-                    found.leaf(self, &bvh.triangles[(at & !LEAF) as usize]);
+                    found.leaf(self, active, &bvh.triangles[(at & !LEAF) as usize]);
                 } else {
-                    found = found.analytic(self, &bvh.analytic[(at & !(LEAF | ANALYTIC)) as usize]);
+                    found = found.analytic(self, active, &bvh.analytic[(at & !(LEAF | ANALYTIC)) as usize]);
                 }
                 loop {
                     if top == 0 {
@@ -214,7 +212,8 @@ impl<const K: usize> Packet<K> {
                     top -= 1;
                     let (enter, child) = stack[top & (ENTRIES - 1)].get();
                     // A child of which a ray has found something nearer, or anything at all, is not worth opening for it.
-                    if enter.simd_le(found.until()).any() {
+                    active = enter.simd_le(found.until());
+                    if active.any() {
                         at = child;
                         break;
                     }
@@ -243,12 +242,18 @@ impl<const K: usize> Packet<K> {
     }
 }
 
+/// The lanes of a mask.
+#[inline(always)]
+fn lanes(mask: u32) -> impl Iterator<Item = usize> {
+    (0..LANES).filter(move |lane| mask >> lane & 1 != 0)
+}
+
 /// What a walk is after.
 trait Found<const K: usize>: Sized {
     /// How far each ray is still of interest; NaN for one that is done.
     fn until(&self) -> f32x8;
-    fn leaf(&mut self, p: &Packet<K>, leaf: &Tri4);
-    fn analytic(self, p: &Packet<K>, shape: &Analytic) -> Self;
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4);
+    fn analytic(self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self;
 }
 
 impl<const K: usize> Found<K> for Bests {
@@ -258,9 +263,9 @@ impl<const K: usize> Found<K> for Bests {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, p: &Packet<K>, leaf: &Tri4) {
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4) {
         for n in 0..leaf.count() {
-            if let Some((hit, [t, u, v])) = p.hits(leaf, n, self.t) {
+            if let Some((hit, [t, u, v])) = p.hits(leaf, n, active, self.t) {
                 let prim = u32x8::splat(leaf.number(n));
                 // `hit` says `t <= self.t`: of equally near hits the lower number wins.
                 let better = hit & (t.simd_lt(self.t) | f32x8::from_bits(prim.simd_lt(self.prim)));
@@ -273,8 +278,8 @@ impl<const K: usize> Found<K> for Bests {
     }
 
     #[inline(never)]
-    fn analytic(mut self, p: &Packet<K>, shape: &Analytic) -> Self {
-        for lane in 0..LANES {
+    fn analytic(mut self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self {
+        for lane in lanes(active.to_bitmask()) {
             let (t, u, v) = (&mut self.t.as_mut_array()[lane], &mut self.u.as_mut_array()[lane], &mut self.v.as_mut_array()[lane]);
             let prim = &mut self.prim.as_mut_array()[lane];
             let mut best = Best { t: *t, u: *u, v: *v, prim: *prim };
@@ -298,9 +303,9 @@ impl<const K: usize> Found<K> for Stopped {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, p: &Packet<K>, leaf: &Tri4) {
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4) {
         for n in 0..leaf.count() {
-            if let Some((hit, _)) = p.hits(leaf, n, self.t_max) {
+            if let Some((hit, _)) = p.hits(leaf, n, active, self.t_max) {
                 self.blocked |= hit;
                 // All bits set is a NaN: this ray is done.
                 self.t_max |= hit;
@@ -309,8 +314,8 @@ impl<const K: usize> Found<K> for Stopped {
     }
 
     #[inline(never)]
-    fn analytic(mut self, p: &Packet<K>, shape: &Analytic) -> Self {
-        for lane in 0..LANES {
+    fn analytic(mut self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self {
+        for lane in lanes(active.to_bitmask()) {
             let t_max = &mut self.t_max.as_mut_array()[lane];
             if shape.occluded(p.origin(lane), p.direction(lane), *t_max) {
                 *t_max = f32::NAN;

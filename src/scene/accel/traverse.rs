@@ -27,7 +27,7 @@ fn in_memory(p: &Probe) -> &Probe {
 impl Bvh {
     /// Starts fetching a child that will be visited soon.
     #[inline(always)]
-    fn fetch(&self, child: u32) {
+    pub(super) fn fetch(&self, child: u32) {
         if !self.large {
             return;
         }

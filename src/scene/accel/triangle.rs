@@ -2,8 +2,8 @@
 //!
 //! \[WOOP\] S. Woop, C. Benthin, I. Wald: Watertight Ray/Triangle Intersection. JCGT 2(1), 2013.
 
-use super::node::fetch;
 use super::probe::Probe;
+use crate::math::fetch;
 use glam::{DVec3, Vec3};
 use wide::f32x4;
 
@@ -56,7 +56,8 @@ impl Tri4 {
         Self { corner }
     }
 
-    /// Which lanes the ray hits with `t <= t_max`, as bits; a lane marked doubtful may have `t <= 0`.
+    /// Which lanes the ray hits with `0 < t <= t_max`, as bits; of a lane marked doubtful `t` is still to be found exactly. Its f32 value
+    /// must not even turn it down, or which of two triangles around the origin wins would depend on which was met first.
     #[inline(always)]
     fn four(&self, p: &Probe, t_max: f32) -> Option<(u32, Four)> {
         let [x, y, z] = p.axis.map(|k| k & 3);
@@ -94,7 +95,7 @@ impl Tri4 {
         let large = deep.fast_max(most(ax, bx, cx)).fast_max(most(ay, by, cy));
         let weight = large * large * scale.abs() * f32x4::splat(DOUBTFUL);
         let doubtful = depth.abs().simd_le(weight * deep);
-        let hit = inside & (doubtful | t.simd_gt(zero)) & t.simd_le(f32x4::splat(t_max));
+        let hit = inside & (doubtful | (t.simd_gt(zero) & t.simd_le(f32x4::splat(t_max))));
         let mask = hit.to_bitmask();
         (mask != 0).then(|| {
             let four = Four { t: t.to_array(), u: u.to_array(), v: v.to_array(), doubtful: doubtful.to_bitmask() };
@@ -112,7 +113,7 @@ impl Tri4 {
             mask &= mask - 1;
             let mut t = four.t[lane];
             if four.doubtful >> lane & 1 != 0 {
-                t = exactly(p.o, p.d, self.corners(lane), t);
+                t = self.exactly(p.o, p.d, lane, t);
                 if t.is_nan() || t <= 0.0 {
                     continue;
                 }
@@ -131,7 +132,7 @@ impl Tri4 {
         }
         (0..4).any(|lane| {
             mask >> lane & 1 != 0 && {
-                let t = exactly(p.o, p.d, self.corners(lane), four.t[lane]);
+                let t = self.exactly(p.o, p.d, lane, four.t[lane]);
                 t > 0.0 && t <= t_max
             }
         })
@@ -162,26 +163,25 @@ impl Tri4 {
         x.simd_eq(x).to_bitmask().count_ones() as usize
     }
 
-    /// The corners of the triangle in a lane.
-    pub(super) fn corners(&self, lane: usize) -> [DVec3; 3] {
-        [0, 1, 2].map(|corner| {
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.coordinate(corner, axis, lane)));
-            DVec3::new(x, y, z)
-        })
+    #[inline(always)]
+    fn at(&self, corner: usize, lane: usize) -> DVec3 {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| f64::from(self.coordinate(corner, axis, lane)));
+        DVec3::new(x, y, z)
     }
-}
 
-/// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
-/// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
-#[cold]
-#[inline(never)]
-pub(super) fn exactly(o: Vec3, d: Vec3, [a, b, c]: [DVec3; 3], t: f32) -> f32 {
-    let n = (b - a).cross(c - a);
-    let along = n.dot(d.as_dvec3());
-    if along == 0.0 {
-        return t;
+    /// `t` by the triangle's plane in f64, where the f32 result is below its own error: an origin moved off the surface
+    /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
+        let a = self.at(0, lane);
+        let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
+        let along = n.dot(d.as_dvec3());
+        if along == 0.0 {
+            return t;
+        }
+        let ahead = n.dot(a - o.as_dvec3());
+        // Most often the ray leaves this triangle: that needs no quotient.
+        if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
     }
-    let ahead = n.dot(a - o.as_dvec3());
-    // Most often the ray leaves this triangle: that needs no quotient.
-    if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
 }

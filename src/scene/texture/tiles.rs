@@ -1,14 +1,6 @@
 //! Texels laid out so that neighbours share a cache line.
 
-#[inline(always)]
-#[cfg(target_arch = "x86_64")]
-fn prefetch<T>(at: &T) {
-    safe_arch::prefetch_t0(at);
-}
-
-#[inline(always)]
-#[cfg(not(target_arch = "x86_64"))]
-fn prefetch<T>(_at: &T) {}
+use crate::math::fetch;
 
 /// Columns of a tile: twenty texels of three bytes fill a cache line.
 const WIDTH: usize = 5;
@@ -55,8 +47,8 @@ impl<T: Copy> Tiles<T> {
     #[inline(always)]
     pub(super) fn prefetch(&self, [x0, y0, x1, y1]: [usize; 4]) {
         let tile = |x: usize, y: usize| &self.tiles[y / HEIGHT * self.across + x / WIDTH];
-        prefetch(tile(x0, y0));
-        prefetch(tile(x1, y1));
+        fetch(tile(x0, y0));
+        fetch(tile(x1, y1));
     }
 
     /// Bytes held.

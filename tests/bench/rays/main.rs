@@ -15,6 +15,9 @@ use workload::{Set, Workload};
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
+/// Rays asked together in the second of our two runs.
+const AT_ONCE: usize = 256;
+
 /// What one run over one set of rays gave.
 #[derive(Clone, Copy, Default)]
 struct Round {
@@ -83,6 +86,28 @@ fn ours(bvh: &Bvh, set: &Set) -> Round {
     Round { seconds: start.elapsed().as_secs_f64(), hits }
 }
 
+/// The same rays, as many at a time as a renderer would have at hand.
+fn ours_at_once(bvh: &Bvh, set: &Set) -> Round {
+    let (mut answers, mut blocked) = ([None; AT_ONCE], [false; AT_ONCE]);
+    let start = ThreadTime::now();
+    let mut hits = 0;
+    let mut sum = 0.0f64;
+    for rays in set.rays.chunks(AT_ONCE) {
+        if set.any {
+            bvh.occluded_each(rays, &mut blocked);
+            hits += blocked[..rays.len()].iter().filter(|b| **b).count() as u64;
+        } else {
+            bvh.closest_each(rays, &mut answers);
+            for hit in answers[..rays.len()].iter().flatten() {
+                hits += 1;
+                sum += f64::from(hit.t);
+            }
+        }
+    }
+    std::hint::black_box(sum);
+    Round { seconds: start.elapsed().as_secs_f64(), hits }
+}
+
 fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
@@ -92,7 +117,7 @@ fn main() -> Outcome<()> {
     let rounds: usize = env::var("RAYS_ROUNDS").map_or(Ok(9), |r| r.parse())?;
     let scenes = env::var("RAYS_SCENES").unwrap_or_else(|_| "32 70k 1m".into());
     let mut ratios = Vec::new();
-    println!("scene  set      rays     ours Mray/s  Embree Mray/s  ratio (quartiles)    misses ours / Embree");
+    println!("scene  set      rays     ours Mray/s  at once / one by one  Embree Mray/s  ratio (quartiles)    misses ours / Embree");
     for name in scenes.split_whitespace() {
         let mesh = workload::scene(name).ok_or_else(|| format!("no scene {name}"))?;
         let primitives: Vec<_> = mesh.soup().map(Primitive::Triangle).collect();
@@ -104,6 +129,7 @@ fn main() -> Outcome<()> {
         let mut embree = Embree::start(&work)?;
         for (k, set) in work.sets.iter().enumerate() {
             let mut both = (Vec::new(), Vec::new(), Vec::new());
+            let mut at_once = Vec::new();
             let mut last = (Round::default(), None);
             for round in 0..rounds {
                 // Who goes first changes, so that neither always finds the clock or the caches in the other's state.
@@ -115,6 +141,11 @@ fn main() -> Outcome<()> {
                 if round % 2 == 1 {
                     theirs = embree.as_mut().map(|e| e.run(k)).transpose()?;
                 }
+                let together = ours_at_once(&bvh, set);
+                if together.hits != mine.hits {
+                    return Err(format!("{name} {}: {} hits at once, {} one by one", set.name, together.hits, mine.hits).into());
+                }
+                at_once.push(mine.seconds / together.seconds);
                 both.0.push(mine.seconds);
                 if let Some(theirs) = theirs {
                     both.1.push(theirs.seconds);
@@ -125,7 +156,7 @@ fn main() -> Outcome<()> {
             let rate = |seconds| set.rays.len() as f64 / 1e6 / median(seconds);
             let n = set.rays.len() as u64;
             let (mine, theirs) = last;
-            print!("{name:6} {:8} {n:8} {:8.2}", set.name, rate(both.0));
+            print!("{name:6} {:8} {n:8} {:8.2}  {:8.2}", set.name, rate(both.0), median(at_once));
             if let Some(theirs) = theirs {
                 let mut sorted = both.2.clone();
                 sorted.sort_by(f64::total_cmp);
