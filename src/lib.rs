@@ -1,7 +1,7 @@
 //! Isophote: a research framework for Metropolis photon tracing.
 //!
 //! Rooms, from the ground up: [`math`], [`image`], [`scene`], [`transport`], [`photons`], [`targets`], [`integrators`],
-//! [`render`], [`cli`]; each imports only from those below its own (`docs/architecture.md`).
+//! [`render`], [`study`], [`cli`]; each imports only from those below its own (`docs/architecture.md`).
 
 pub mod cli;
 pub mod image;
@@ -10,6 +10,7 @@ pub mod math;
 pub mod photons;
 pub mod render;
 pub mod scene;
+pub mod study;
 pub mod targets;
 pub mod transport;
 
