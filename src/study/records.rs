@@ -11,6 +11,7 @@ use std::path::PathBuf;
 pub const SCHEMA: u32 = 1;
 
 /// A line of `records.jsonl`.
+#[expect(clippy::large_enum_variant, reason = "a study has few lines, read once")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Record {
