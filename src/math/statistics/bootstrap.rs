@@ -1,0 +1,103 @@
+//! Intervals by drawing whole runs again (\[EFRON93\]).
+
+use super::hypothesis::student_quantile;
+use crate::samplers::{Key, Stream};
+
+/// Resamples for an interval unless a caller asks for another number: the standard error then carries 1.6 % of noise of its own.
+pub const RESAMPLES: usize = 2000;
+
+/// A closed interval of finite numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end, not below `low`.
+    pub high: f64,
+}
+
+impl Interval {
+    /// From end to end; `None` unless both are finite and in order.
+    pub fn of(low: f64, high: f64) -> Option<Self> {
+        (low.is_finite() && high.is_finite() && low <= high).then_some(Self { low, high })
+    }
+
+    /// The interval of points no farther than `half` from `centre`.
+    pub fn around(centre: f64, half: f64) -> Option<Self> {
+        Self::of(centre - half, centre + half)
+    }
+
+    /// Whether `x` lies in it, ends included.
+    pub fn contains(&self, x: f64) -> bool {
+        self.low <= x && x <= self.high
+    }
+
+    /// Length.
+    pub fn width(&self) -> f64 {
+        self.high - self.low
+    }
+
+    /// Both ends through `e^x`: from a logarithm's interval to its number's. `None` where that is not finite.
+    pub fn exp(&self) -> Option<Self> {
+        Self::of(self.low.exp(), self.high.exp())
+    }
+}
+
+/// Confidence interval of a smooth statistic (a mean, a slope, a logarithm of either) of `runs` independent runs.
+///
+/// `statistic` is given indices of runs, `runs` of them, drawn with replacement, and computes its number as if these were the runs. The
+/// interval is `estimate +- t * s * sqrt(K / (K - 1))`: `s` the standard deviation over resamples, `t` Student's quantile with `K - 1`
+/// degrees of freedom, the root because a resample's variance is short by that factor (\[EFRON93 12.4\], \[HESTERBERG15\]). Percentile and BCa intervals lack both
+/// corrections and hold the truth 75 to 90 % of the time at 4 to 8 runs where 95 % is asked (docs/statistics.md). The interval is
+/// symmetric: pass a logarithm where the statistic is positive and skewed. For medians see [`bootstrap_percentile`].
+///
+/// All randomness comes from `key` ([`Purpose::Test`](crate::samplers::Purpose::Test) is for this): equal keys, equal intervals. `None` with fewer than two runs or two resamples, for a level outside
+/// (0, 1), and where the statistic of the runs or of any resample is not finite.
+pub fn bootstrap(runs: usize, resamples: usize, level: f64, key: Key, statistic: impl Fn(&[usize]) -> f64) -> Option<Interval> {
+    let (estimate, values) = resample(runs, resamples, level, key, statistic)?;
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let freedom = (runs - 1) as f64;
+    let half = student_quantile(0.5 + 0.5 * level, freedom) * (variance * runs as f64 / freedom).sqrt();
+    Interval::around(estimate, half)
+}
+
+/// Confidence interval of a statistic that jumps, such as a median: the quantiles of its resampled values (\[EFRON93 13.3\]).
+///
+/// Arguments and outcome as for [`bootstrap`]; also `None` with fewer than `2 / (1 - level)` resamples, where the tail would be empty. From
+/// `K` runs a median's interval can reach no level above `1 - 2^(1-K)`, for it ends at the smallest and the largest run at the most:
+/// callers see to that.
+pub fn bootstrap_percentile(runs: usize, resamples: usize, level: f64, key: Key, statistic: impl Fn(&[usize]) -> f64) -> Option<Interval> {
+    let (_, mut values) = resample(runs, resamples, level, key, statistic)?;
+    if 0.5 * (1.0 - level) * (resamples as f64) < 1.0 {
+        return None;
+    }
+    values.sort_unstable_by(f64::total_cmp);
+    Interval::of(quantile(&values, 0.5 - 0.5 * level), quantile(&values, 0.5 + 0.5 * level))
+}
+
+/// Quantile of sorted values: linear between them, the i-th of n (from 1) at i / (n + 1).
+fn quantile(sorted: &[f64], p: f64) -> f64 {
+    let last = sorted.len() - 1;
+    let place = (p * (sorted.len() + 1) as f64 - 1.0).clamp(0.0, last as f64);
+    let (below, part) = (place.floor() as usize, place.fract());
+    // The second term is left out at the end, where there is no value above.
+    if part == 0.0 { sorted[below] } else { sorted[below] + part * (sorted[below + 1] - sorted[below]) }
+}
+
+/// The statistic of the runs as they are, and of each resample.
+fn resample(runs: usize, resamples: usize, level: f64, key: Key, statistic: impl Fn(&[usize]) -> f64) -> Option<(f64, Vec<f64>)> {
+    if runs < 2 || resamples < 2 || !(level > 0.0 && level < 1.0) {
+        return None;
+    }
+    let mut drawn: Vec<usize> = (0..runs).collect();
+    let estimate = statistic(&drawn);
+    let mut stream = key.stream();
+    let mut values = Vec::with_capacity(resamples);
+    for _ in 0..resamples {
+        // A coordinate has 24 bits: below 2^24 runs every index can be drawn, and the product stays below `runs` in f64.
+        drawn.fill_with(|| (f64::from(stream.next_1d()) * runs as f64) as usize);
+        values.push(statistic(&drawn));
+    }
+    (estimate.is_finite() && values.iter().all(|v| v.is_finite())).then_some((estimate, values))
+}
