@@ -11,10 +11,10 @@ mod ratio;
 mod sample;
 mod slope;
 
-pub use bootstrap::{Interval, RESAMPLES, bootstrap, bootstrap_percentile};
+pub use bootstrap::{Interval, RESAMPLES, bootstrap, bootstrap_median, bootstrap_percentile};
 pub use fit::{Fit, least_squares};
 pub use hypothesis::{chi_squared, student_quantile, student_two_sided, welch};
 pub use multiple::{benjamini_hochberg, sidak};
-pub use ratio::{Ratio, Verdict, at_most, paired_ratio, speed_up};
+pub use ratio::{Ratio, Verdict, at_most, median_interval, paired_ratio, speed_up};
 pub use sample::{Sample, Split, efficiency, inefficiency, median, split, time_to_unit_variance};
 pub use slope::{Slope, log_log_slope, log_log_slope_of};

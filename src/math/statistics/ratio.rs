@@ -1,6 +1,6 @@
 //! Which of two methods is better, by how much, and whether that is certain.
 
-use super::bootstrap::{Interval, RESAMPLES, bootstrap, bootstrap_percentile};
+use super::bootstrap::{Interval, RESAMPLES, bootstrap_median};
 use super::hypothesis::student_quantile;
 use super::sample::{median_of, positive};
 use crate::samplers::Key;
@@ -44,8 +44,7 @@ pub enum Verdict {
 /// Ratio of the medians of `a` and `b`, where `a[i]` and `b[i]` are of the same seed, with a paired bootstrap interval: pairs are drawn
 /// together, so that what a seed does to both cancels.
 ///
-/// The interval is by percentiles ([`bootstrap_percentile`]) where as many runs can carry one, and [`bootstrap`] on the ratio's
-/// logarithm with fewer (docs/statistics.md has the coverage of both). All randomness comes from `key`.
+/// The interval is that of [`bootstrap_median`] on the ratio's logarithm, with [`RESAMPLES`]. All randomness comes from `key`.
 ///
 /// `None` for lists that are empty or of different length, for values that are not finite and positive, and for a level outside (0, 1).
 pub fn paired_ratio(a: &[f64], b: &[f64], level: f64, key: Key) -> Option<Ratio> {
@@ -58,13 +57,19 @@ pub fn paired_ratio(a: &[f64], b: &[f64], level: f64, key: Key) -> Option<Ratio>
     let middle = |list: &[f64], drawn: &[usize]| median_of(&mut drawn.iter().map(|&i| list[i]).collect::<Vec<f64>>()).ln();
     let statistic = |drawn: &[usize]| middle(a, drawn) - middle(b, drawn);
     let runs = a.len();
-    let interval = if percentiles_reach(runs, level) {
-        bootstrap_percentile(runs, RESAMPLES, level, key, statistic)
-    } else {
-        bootstrap(runs, RESAMPLES, level, key, statistic)
-    };
+    let interval = bootstrap_median(runs, RESAMPLES, level, key, statistic);
     let ratio = positive(statistic(&(0..runs).collect::<Vec<usize>>()).exp())?;
     Some(Ratio { ratio, interval: interval.and_then(|i| i.exp()), runs, level, spread: spread(&log_a, &log_b) })
+}
+
+/// Confidence interval of the median of runs, by [`bootstrap_median`] with [`RESAMPLES`]. `None` with fewer than two runs, for values that
+/// are not finite, and for a level outside (0, 1).
+pub fn median_interval(values: &[f64], level: f64, key: Key) -> Option<Interval> {
+    if values.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let statistic = |drawn: &[usize]| median_of(&mut drawn.iter().map(|&i| values[i]).collect::<Vec<f64>>());
+    bootstrap_median(values.len(), RESAMPLES, level, key, statistic)
 }
 
 /// How many times as fast `method` is as `baseline`, both given as seconds at equal error, or as error times seconds
@@ -87,12 +92,6 @@ pub fn at_most(ratio: &Ratio, bound: f64) -> Option<Verdict> {
     } else {
         Verdict::Undecided { more_runs: more_runs(ratio, bound) }
     })
-}
-
-/// Whether the median's widest percentile interval, from the smallest run to the largest, reaches the level. Its level is
-/// `1 - 2^(1-K)`; a shortfall of a quarter of `1 - level` is let pass, which lets 5 runs give 93.75 % for 95 %.
-fn percentiles_reach(runs: usize, level: f64) -> bool {
-    0.5f64.powi(runs.saturating_sub(1).min(1000) as i32) <= 1.25 * (1.0 - level)
 }
 
 /// Standard deviation of `log median(a) - log median(b)` times the root of the number of runs, for logarithms that are normal: a median's
@@ -130,4 +129,80 @@ fn more_runs(ratio: &Ratio, bound: f64) -> Option<usize> {
         if fits(middle) { high = middle } else { low = middle }
     }
     Some(high as usize - ratio.runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samplers::Purpose;
+
+    const KEY: Key = Key { seed: 1, iteration: 0, index: 0, purpose: Purpose::Test };
+
+    #[test]
+    fn what_a_seed_does_to_both_cancels() {
+        let b = [1.0, 100.0, 3.0, 0.01, 7.0, 20.0];
+        let a = b.map(|x| 2.0 * x);
+        let r = paired_ratio(&a, &b, 0.95, KEY).unwrap();
+        let i = r.interval.unwrap();
+        assert!((r.ratio - 2.0).abs() < 1e-12 && (i.low - 2.0).abs() < 1e-12 && (i.high - 2.0).abs() < 1e-12, "{r:?}");
+        assert!(r.spread.unwrap() < 1e-6);
+        let other = paired_ratio(&a, &[7.0, 3.0, 20.0, 1.0, 0.01, 100.0], 0.95, KEY).unwrap().interval.unwrap();
+        assert!(other.width() > 1.0);
+        assert_eq!(speed_up(&a, &b, 0.95, KEY), Some(r));
+    }
+
+    #[test]
+    fn unusable_lists_have_no_ratio() {
+        let fine = [1.0, 2.0, 3.0];
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(paired_ratio(&fine, &[1.0, bad, 3.0], 0.95, KEY), None);
+            assert_eq!(paired_ratio(&[1.0, bad, 3.0], &fine, 0.95, KEY), None);
+        }
+        assert_eq!(paired_ratio(&fine, &fine[..2], 0.95, KEY), None);
+        assert_eq!(paired_ratio(&[], &[], 0.95, KEY), None);
+        assert_eq!(paired_ratio(&fine, &fine, 1.0, KEY), None);
+        let single = paired_ratio(&[6.0], &[2.0], 0.95, KEY).unwrap();
+        assert!((single.ratio - 3.0).abs() < 1e-12);
+        assert_eq!((single.interval, single.spread, at_most(&single, 1.0)), (None, None, None));
+        assert_eq!(median_interval(&[1.0, f64::NAN, 2.0], 0.95, KEY), None);
+        assert!(median_interval(&fine, 0.95, KEY).unwrap().contains(2.0));
+    }
+
+    fn ratio(ratio: f64, low: f64, high: f64) -> Ratio {
+        Ratio { ratio, interval: Interval::of(low, high), runs: 8, level: 0.95, spread: Some(0.5) }
+    }
+
+    #[test]
+    fn a_claim_is_decided_on_the_whole_interval() {
+        let r = ratio(0.9, 0.8, 1.1);
+        assert_eq!(at_most(&r, 1.1), Some(Verdict::Holds));
+        assert_eq!(at_most(&r, 0.79), Some(Verdict::Refuted));
+        assert!(matches!(at_most(&r, 0.8), Some(Verdict::Undecided { .. })));
+        for bound in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(at_most(&r, bound), None);
+        }
+    }
+
+    /// With n pairs the interval reaches `t(n - 1) * 0.5 / sqrt(n)` up; ln(1 / 0.9) = 0.10536. n = 89: 1.9873 * 0.5 / 9.4340 = 0.10533 fits,
+    /// n = 88: 1.9876 * 0.5 / 9.3808 = 0.10594 does not.
+    #[test]
+    fn more_runs_are_counted_from_the_spread() {
+        assert_eq!(at_most(&ratio(0.9, 0.8, 1.1), 1.0), Some(Verdict::Undecided { more_runs: Some(89 - 8) }));
+        // On the wrong side, on the bound, and hopelessly near it.
+        for wrong in [1.0001, 1.0, 1.0 - 1e-9] {
+            assert_eq!(at_most(&ratio(wrong, 0.8, 1.1), 1.0), Some(Verdict::Undecided { more_runs: None }));
+        }
+        // An interval wider than its spread promises still asks for one run.
+        assert_eq!(at_most(&ratio(0.1, 0.05, 1.1), 1.0), Some(Verdict::Undecided { more_runs: Some(1) }));
+    }
+
+    /// Independent lists: the spreads add. A list and its own multiple: nothing is left.
+    #[test]
+    fn the_spread_of_two_medians() {
+        let log_a = [-1.0, 1.0, -1.0, 1.0];
+        let log_b = [-1.0, -1.0, 1.0, 1.0];
+        assert!((spread(&log_a, &log_b).unwrap() - (FRAC_PI_2 * 2.0 * 4.0 / 3.0).sqrt()).abs() < 1e-12);
+        assert!(spread(&log_a, &log_a).unwrap() < 1e-6);
+        assert!((spread(&log_a, &[2.0; 4]).unwrap() - (FRAC_PI_2 * 4.0 / 3.0).sqrt()).abs() < 1e-12);
+    }
 }

@@ -90,3 +90,61 @@ fn distinct(values: &[f64]) -> usize {
     sorted.dedup();
     sorted.len()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samplers::Purpose;
+
+    const KEY: Key = Key { seed: 1, iteration: 0, index: 0, purpose: Purpose::Test };
+    const ALL: (f64, f64) = (0.0, f64::INFINITY);
+
+    fn powers(from: u32, to: u32) -> Vec<f64> {
+        (from..=to).map(|e| f64::from(1u32 << e)).collect()
+    }
+
+    #[test]
+    fn an_exact_power_is_recovered_in_its_window() {
+        let x = powers(0, 10);
+        let run = |scale: f64| x.iter().map(|x| if *x < 8.0 { 77.0 } else { scale * x.powf(-0.75) }).collect::<Vec<f64>>();
+        let y = [run(2.0), run(4.0), run(6.0)];
+        let fit = log_log_slope(&x, &y, (8.0, 512.0), 0.95, KEY).unwrap();
+        assert!((fit.slope + 0.75).abs() < 1e-12 && (fit.intercept - 4f64.ln()).abs() < 1e-12, "{fit:?}");
+        assert_eq!((fit.from, fit.to, fit.points), (8.0, 512.0, 7));
+        assert!((fit.at(16.0) - 4.0 * 16f64.powf(-0.75)).abs() < 1e-12);
+        assert!(fit.interval.unwrap().width() < 1e-12);
+        assert_eq!(log_log_slope(&x, &y[..1], (8.0, 512.0), 0.95, KEY).unwrap().interval, None);
+    }
+
+    #[test]
+    fn a_fit_leaves_nothing_out() {
+        let x = powers(0, 4);
+        let fine = vec![1.0, 0.5, 0.25, 0.125, 0.0625];
+        let fit = |y: Vec<f64>| log_log_slope(&x, &[fine.clone(), y], ALL, 0.95, KEY);
+        assert!(fit(fine.clone()).is_some());
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let mut y = fine.clone();
+            y[4] = bad;
+            assert_eq!(fit(y.clone()), None);
+            // Outside the window it does not matter.
+            assert!(log_log_slope(&x, &[fine.clone(), y], (1.0, 8.0), 0.95, KEY).is_some());
+        }
+        assert_eq!(fit(fine[..4].to_vec()), None);
+        assert_eq!(log_log_slope(&x, &[], ALL, 0.95, KEY), None);
+        assert_eq!(log_log_slope(&x, &[fine.clone()], (1.0, 2.0), 0.95, KEY), None);
+        assert_eq!(log_log_slope(&[1.0, 1.0, 2.0], &[vec![1.0; 3]], ALL, 0.95, KEY), None);
+        assert_eq!(log_log_slope(&[0.0, 1.0, 2.0, 4.0], &[vec![1.0; 4]], ALL, 0.95, KEY), None);
+        assert_eq!(log_log_slope(&x, &[fine.clone()], (f64::NAN, 8.0), 0.95, KEY), None);
+    }
+
+    /// The slope of a curve that some resamples bring below zero has an estimate and no interval.
+    #[test]
+    fn a_curve_that_dips_below_zero_has_no_interval() {
+        let x = powers(0, 4);
+        let curve = |drawn: &[usize], point: usize| if drawn.contains(&0) { x[point] } else { -1.0 };
+        let fit = log_log_slope_of(&x, 4, ALL, 0.95, KEY, curve).unwrap();
+        assert!((fit.slope - 1.0).abs() < 1e-12);
+        assert_eq!(fit.interval, None);
+        assert_eq!(log_log_slope_of(&x, 4, ALL, 0.95, KEY, |_, _| -1.0), None);
+    }
+}
