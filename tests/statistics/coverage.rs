@@ -26,13 +26,16 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// Repeats a study. Every repetition must give an estimate and an interval.
+    /// Repeats a study. At most one repetition in two hundred may end without an interval: where a resample draws one
+    /// run alone, which happens to a variance over eight runs once in a thousand studies.
     pub(crate) fn of(name: String, truth: f64, repetitions: u64, study: impl Fn(u64) -> (f64, Option<Interval>) + Sync) -> Self {
-        let found = (0..repetitions).into_par_iter().map(|r| {
+        let found = (0..repetitions).into_par_iter().filter_map(|r| {
             let (estimate, interval) = study(r);
-            (estimate, interval.unwrap_or_else(|| panic!("repetition {r} has no interval")))
+            Some((estimate, interval?))
         });
         let coverage = Self { name, truth, found: found.collect() };
+        let without = repetitions - coverage.found.len() as u64;
+        assert!(200 * without <= repetitions, "{}: {without} of {repetitions} have no interval", coverage.name);
         eprintln!("{}", coverage.line());
         coverage
     }
@@ -83,20 +86,20 @@ impl Coverage {
         )
     }
 
-    /// Fails unless the intervals hold the truth at their nominal rate.
-    pub(crate) fn assert_nominal(&self) {
-        self.assert_at_least();
-        assert!(self.too_wide() > TEST, "too wide: {}", self.line());
+    /// Whether the intervals hold the truth at their nominal rate.
+    pub(crate) fn nominal(&self) -> Result<(), String> {
+        self.at_least()?;
+        if self.too_wide() > TEST { Ok(()) } else { Err(format!("too wide: {}", self.line())) }
     }
 
-    /// Fails if the intervals hold the truth less often than they say.
-    pub(crate) fn assert_at_least(&self) {
-        assert!(self.too_narrow() > TEST, "too narrow: {}", self.line());
+    /// Whether the intervals hold the truth as often as they say, or more often.
+    pub(crate) fn at_least(&self) -> Result<(), String> {
+        if self.too_narrow() > TEST { Ok(()) } else { Err(format!("too narrow: {}", self.line())) }
     }
 
-    /// Fails if the estimates are off on average.
-    pub(crate) fn assert_unbiased(&self) {
-        assert!(self.mean_is_truth() > TEST, "off: {}", self.line());
+    /// Whether the estimates are right on average.
+    pub(crate) fn unbiased(&self) -> Result<(), String> {
+        if self.mean_is_truth() > TEST { Ok(()) } else { Err(format!("off: {}", self.line())) }
     }
 
     /// The same with every interval scaled about its middle: a planted fault.

@@ -1,9 +1,9 @@
 //! Speed-ups, and claims decided on them.
 
 use crate::coverage::{Coverage, LEVEL, REPETITIONS, TEST, key};
-use crate::fake::{Fake, SNAPSHOTS, normal, relative_error, unbiased};
+use crate::fake::{Fake, SNAPSHOTS, Snapshot, normal, relative_error, unbiased};
 use isophote::math::statistics::{
-    Ratio, Verdict, at_most, bootstrap, inefficiency, median_interval, paired_ratio, speed_up, time_to_unit_variance,
+    Interval, Ratio, Verdict, at_most, bootstrap, inefficiency, median, median_interval, paired_ratio, speed_up, time_to_unit_variance,
 };
 use isophote::samplers::{Key, Purpose};
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 /// Error times seconds at the end of each run.
 fn costs(fake: &Fake, repetition: u64, runs: usize) -> Vec<f64> {
-    let cost = |run: &Vec<crate::fake::Snapshot>| {
+    let cost = |run: &Vec<Snapshot>| {
         let last = &run[SNAPSHOTS - 1];
         inefficiency(relative_error(last), last.seconds).unwrap()
     };
@@ -26,8 +26,8 @@ fn pair(spread: f64, shared: f64) -> (Fake, Fake) {
 
 const FASTER: f64 = 2.5;
 
-fn log_ratio(ratio: &Ratio) -> (f64, Option<isophote::math::statistics::Interval>) {
-    let logs = ratio.interval.and_then(|i| isophote::math::statistics::Interval::of(i.low.ln(), i.high.ln()));
+fn log_ratio(ratio: &Ratio) -> (f64, Option<Interval>) {
+    let logs = ratio.interval.and_then(|i| Interval::of(i.low.ln(), i.high.ln()));
     (ratio.ratio.ln(), logs)
 }
 
@@ -42,17 +42,17 @@ fn coverage(spread: f64, shared: f64, runs: usize, repetitions: u64) -> Coverage
 fn speed_ups_are_recovered_and_covered() {
     for (shared, runs) in [(0.0, 8), (0.0, 16), (0.8, 8), (0.8, 16)] {
         let found = coverage(0.3, shared, runs, REPETITIONS);
-        found.assert_at_least();
-        found.assert_unbiased();
-        assert!(found.share() < 0.99, "too wide to be of use");
-        assert!(std::panic::catch_unwind(|| found.scaled(0.5).assert_at_least()).is_err());
+        found.at_least().unwrap();
+        found.unbiased().unwrap();
+        assert!(found.share() < 0.995, "too wide to be of use");
+        assert!(found.scaled(0.5).at_least().is_err());
     }
 }
 
 #[test]
 fn efficiency_does_not_depend_on_time_and_is_what_was_planted() {
     let fake = Fake { spread: 0.0, jitter: 0.0, ..unbiased(5) };
-    let unit = |run: &Vec<crate::fake::Snapshot>, at: usize| time_to_unit_variance(relative_error(&run[at]), run[at].seconds).unwrap();
+    let unit = |run: &Vec<Snapshot>, at: usize| time_to_unit_variance(relative_error(&run[at]), run[at].seconds).unwrap();
     for at in [0, 5, SNAPSHOTS - 1] {
         let found = (0..400).map(|seed| unit(&fake.run(seed), at)).sum::<f64>() / 400.0;
         let planted = fake.noise * fake.noise * fake.seconds;
@@ -86,10 +86,10 @@ fn claims_are_seldom_decided_wrongly() {
             assert!(wrong == 0 || law.sf(wrong - 1) > TEST, "{wrong} wrong decisions");
         }
         // Far from the truth all are right.
-        let [holds, refuted, _] = verdicts(2.0 * FASTER, runs, 100);
-        assert!(holds > 80 && refuted == 0, "{holds} of 100 hold at twice the truth, {refuted} are refuted");
-        let [holds, refuted, _] = verdicts(0.5 * FASTER, runs, 100);
-        assert!(refuted > 80 && holds == 0, "{refuted} of 100 are refuted at half the truth, {holds} hold");
+        let [holds, refuted, _] = verdicts(4.0 * FASTER, runs, 100);
+        assert!(holds > 80 && refuted == 0, "{holds} of 100 hold at four times the truth, {refuted} are refuted");
+        let [holds, refuted, _] = verdicts(0.25 * FASTER, runs, 100);
+        assert!(refuted > 80 && holds == 0, "{refuted} of 100 are refuted at a quarter of the truth, {holds} hold");
     }
 }
 
@@ -100,13 +100,7 @@ fn the_seeds_asked_for_are_about_enough() {
     let (slow, fast) = pair(0.3, 0.5);
     // Asked of one study large enough that estimate and spread are near the truth.
     let logs = paired_ratio(&costs(&slow, 7, 900), &costs(&fast, 7, 900), LEVEL, key(7)).unwrap();
-    let at_truth = Ratio {
-        ratio: FASTER,
-        interval: isophote::math::statistics::Interval::of(0.5 * FASTER, 2.0 * FASTER),
-        runs: 4,
-        spread: logs.spread,
-        ..logs
-    };
+    let at_truth = Ratio { ratio: FASTER, interval: Interval::of(0.5 * FASTER, 2.0 * FASTER), runs: 4, spread: logs.spread, ..logs };
     let Some(Verdict::Undecided { more_runs: Some(more) }) = at_most(&at_truth, bound) else { panic!("decided or hopeless") };
     let enough = 4 + more;
     let share = |runs: usize| verdicts(bound, runs, 200)[0] as f64 / 200.0;
@@ -116,17 +110,12 @@ fn the_seeds_asked_for_are_about_enough() {
 }
 
 #[test]
-#[ignore = "half a minute; run by .ci/run"]
+#[ignore = "minutes; run by .ci/run"]
 fn speed_ups_at_all_numbers_of_runs() {
     for runs in [3, 4, 5, 6, 8, 12, 16, 32] {
         for (spread, shared) in [(0.3, 0.0), (0.3, 0.8), (0.6, 0.5)] {
             let found = coverage(spread, shared, runs, 4 * REPETITIONS);
-            // Five runs give 93.75 % for 95 %; see bootstrap_median.
-            if runs == 5 {
-                assert!(found.share() > 0.925);
-            } else {
-                found.assert_at_least();
-            }
+            found.at_least().unwrap();
         }
     }
 }
@@ -139,7 +128,7 @@ fn lognormal(repetition: u64, runs: usize, spread: f64) -> Vec<f64> {
 }
 
 #[test]
-#[ignore = "seconds; run by .ci/run"]
+#[ignore = "minutes; run by .ci/run"]
 fn means_and_medians_of_lognormal_runs() {
     for spread in [0.3, 0.8] {
         for runs in [4, 5, 8, 16] {
@@ -151,12 +140,12 @@ fn means_and_medians_of_lognormal_runs() {
             let found = Coverage::of(format!("log mean of lognormal {spread}, {runs} runs"), 0.5 * spread * spread, 4 * REPETITIONS, mean);
             // Short where the tail is heavy; docs/statistics.md says by how much.
             assert!(found.share() > if spread > 0.5 { 0.87 } else { 0.925 });
-            let median = |r| {
+            let middle = |r| {
                 let values = lognormal(r, runs, spread);
-                (isophote::math::statistics::median(&values).unwrap(), median_interval(&values, LEVEL, key(r)))
+                (median(&values).unwrap(), median_interval(&values, LEVEL, key(r)))
             };
-            let found = Coverage::of(format!("median of lognormal {spread}, {runs} runs"), 1.0, 4 * REPETITIONS, median);
-            assert!(found.share() > 0.925);
+            let found = Coverage::of(format!("median of lognormal {spread}, {runs} runs"), 1.0, 4 * REPETITIONS, middle);
+            assert!(found.share() > 0.92);
         }
     }
 }

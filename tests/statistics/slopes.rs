@@ -2,7 +2,7 @@
 
 use crate::coverage::{Coverage, LEVEL, REPETITIONS, key};
 use crate::fake::{Fake, Snapshot, VALUES, iterations, progressive, relative_error, truth, unbiased};
-use isophote::math::statistics::{Slope, log_log_slope, log_log_slope_of};
+use isophote::math::statistics::{Interval, Slope, log_log_slope, log_log_slope_of};
 
 /// Two decades of iterations.
 const WINDOW: (f64, f64) = (16.0, 2048.0);
@@ -45,7 +45,7 @@ fn noise_and_bias_slope(fake: &Fake, repetition: u64, runs: usize) -> (Option<Sl
     (noise, bias)
 }
 
-fn of_slope(slope: Option<Slope>) -> (f64, Option<isophote::math::statistics::Interval>) {
+fn of_slope(slope: Option<Slope>) -> (f64, Option<Interval>) {
     let slope = slope.unwrap();
     (slope.slope, slope.interval)
 }
@@ -67,28 +67,21 @@ fn bias_coverage(name: &str, fake: &Fake, runs: usize, repetitions: u64) -> Cove
 
 #[test]
 fn error_slopes_are_recovered_and_covered() {
-    for runs in [8, 16] {
-        let found = error_coverage("path", &unbiased(1), runs, REPETITIONS);
-        found.assert_nominal();
-        found.assert_unbiased();
+    let eight = error_coverage("path", &unbiased(1), 8, REPETITIONS);
+    let others = [
+        error_coverage("path", &unbiased(2), 16, REPETITIONS),
+        error_coverage("alpha 2/3", &Fake { bias: 0.0, ..progressive(3, 2.0 / 3.0) }, 8, REPETITIONS),
+    ];
+    for found in others.iter().chain([&eight]) {
+        found.nominal().unwrap();
+        found.unbiased().unwrap();
     }
-    let found = error_coverage("alpha 2/3", &Fake { bias: 0.0, ..progressive(1, 2.0 / 3.0) }, 8, REPETITIONS);
-    found.assert_nominal();
-    found.assert_unbiased();
-}
-
-/// The tests above can fail: an interval a fifth too narrow, and a slope 0.05 off.
-#[test]
-fn planted_faults_are_seen() {
-    let found = error_coverage("path", &unbiased(1), 8, REPETITIONS);
-    assert!(std::panic::catch_unwind(|| found.scaled(0.8).assert_nominal()).is_err());
-    assert!(std::panic::catch_unwind(|| found.scaled(1.4).assert_nominal()).is_err());
+    // All this can fail: intervals a fifth too narrow or too wide by two fifths, slopes 0.05 off, and even a mean slope 0.01 off.
+    assert!(eight.scaled(0.8).nominal().is_err() && eight.scaled(1.4).nominal().is_err());
     for by in [-0.05, 0.05] {
-        assert!(std::panic::catch_unwind(|| found.moved(by).assert_nominal()).is_err());
-        assert!(std::panic::catch_unwind(|| found.moved(by).assert_unbiased()).is_err());
+        assert!(eight.moved(by).nominal().is_err() && eight.moved(by).unbiased().is_err());
     }
-    // A twenty-fifth of that is seen too: the mean of a thousand slopes is sharp.
-    assert!(std::panic::catch_unwind(|| found.moved(0.002).assert_unbiased()).is_err());
+    assert!(eight.moved(0.01).unbiased().is_err());
 }
 
 /// A single study of sixteen seeds finds both exponents of two alphas within 0.05, as a study of SPPM is asked to.
@@ -105,15 +98,16 @@ fn one_study_finds_noise_and_bias_within_a_twentieth() {
 }
 
 #[test]
-#[ignore = "half a minute; run by .ci/run"]
+#[ignore = "minutes; run by .ci/run"]
 fn all_slopes_at_all_numbers_of_runs() {
     for runs in [4, 5, 8, 16] {
-        error_coverage("path", &unbiased(1), runs, REPETITIONS).assert_nominal();
-        error_coverage("path, loud seeds", &Fake { spread: 0.6, ..unbiased(1) }, runs, REPETITIONS).assert_nominal();
-        for alpha in [2.0 / 3.0, 0.75] {
-            let fake = progressive(1, alpha);
-            noise_coverage(&format!("alpha {alpha:.2}"), &fake, runs, REPETITIONS).assert_nominal();
-            bias_coverage(&format!("alpha {alpha:.2}"), &fake, runs, REPETITIONS).assert_nominal();
+        error_coverage("path", &unbiased(1), runs, REPETITIONS).nominal().unwrap();
+        error_coverage("path, loud seeds", &Fake { spread: 0.6, ..unbiased(10) }, runs, REPETITIONS).nominal().unwrap();
+        // A variance over fewer runs has no bootstrap interval: sooner or later a resample is one run alone.
+        for (method, alpha) in [(11, 2.0 / 3.0), (12, 0.75)].into_iter().filter(|_| runs >= 8) {
+            let fake = progressive(method, alpha);
+            noise_coverage(&format!("alpha {alpha:.2}"), &fake, runs, REPETITIONS).nominal().unwrap();
+            bias_coverage(&format!("alpha {alpha:.2}"), &fake, runs, REPETITIONS).nominal().unwrap();
         }
     }
 }

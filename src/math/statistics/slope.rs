@@ -51,7 +51,8 @@ pub fn log_log_slope(x: &[f64], y: &[Vec<f64>], window: (f64, f64), level: f64, 
 /// As [`log_log_slope`] for any curve over runs: `curve(runs, point)` is its height at `x[point]` with these runs, such as a standard
 /// deviation over runs or the root of a squared bias averaged over pixels.
 ///
-/// `None` also where the curve of the runs is not finite and positive in the window. Where that befalls a resample, there is no interval.
+/// `None` also where the curve of the runs is not finite and positive in the window. Where that befalls a resample, there is no
+/// interval: a deviation over runs needs eight of them, because a resample of fewer now and then is one run alone, and has none.
 pub fn log_log_slope_of(
     x: &[f64],
     runs: usize,
