@@ -1,9 +1,10 @@
-//! Images: the film's sums and counts, EXR files with metadata, metrics, tone mapping.
+//! Images: the film's sums and counts, EXR files with metadata, metrics, what several runs say together, tone mapping.
 
 pub mod exr;
 pub mod file;
 pub mod film;
 pub mod metrics;
 pub mod picture;
+pub mod runs;
 pub mod tiles;
 pub mod tonemap;

@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn values_are_those_of_the_independent_script() {
         let (reference, image) = oracle_pictures();
-        let stored: serde_json::Value = serde_json::from_str(include_str!("../../tests/oracle/metrics.json")).expect("JSON");
+        let stored: serde_json::Value = serde_json::from_str(include_str!("../../../tests/oracle/metrics.json")).expect("JSON");
         for (epsilon, key) in [(0.01, "0.01"), (0.5, "0.5")] {
             for metric in METRICS {
                 let found = value(metric.name, &reference, &image, epsilon).value.expect("a value");
