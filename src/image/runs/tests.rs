@@ -1,11 +1,11 @@
 use super::*;
 use crate::image::metrics::{Pairs, metric};
+use isophote_samplers::{Key, Purpose, Stream};
 
-/// Normal numbers from sums of twelve hashed ones; a run's pixels are independent of each other and of other runs'.
+/// A normal number, nearly: the sum of twelve uniform ones.
 fn normal(run: u64, index: u64) -> f64 {
-    use isophote_samplers::{Key, Purpose};
-    let mut stream = Key::new(run).iteration(index).stream(0, Purpose::Camera);
-    (0..12).map(|_| f64::from(stream.next_f32())).sum::<f64>() - 6.0
+    let mut stream = Key { seed: run, iteration: 0, index, purpose: Purpose::Test }.stream();
+    (0..12).map(|_| f64::from(stream.next_1d())).sum::<f64>() - 6.0
 }
 
 fn picture(width: usize, height: usize, value: impl Fn(usize, usize) -> f32) -> Picture {
