@@ -161,11 +161,7 @@ impl Runs {
     }
 
     fn same_size(&self, picture: &Picture) -> Result<(), SizeMismatch> {
-        if picture.size() == self.size() {
-            Ok(())
-        } else {
-            Err(SizeMismatch { image: picture.size(), reference: self.size() })
-        }
+        if picture.size() == self.size() { Ok(()) } else { Err(SizeMismatch { image: picture.size(), reference: self.size() }) }
     }
 
     fn variance_at(&self, i: usize, c: usize) -> f64 {
