@@ -5,6 +5,7 @@ pub mod file;
 pub mod film;
 pub mod metrics;
 pub mod picture;
+pub mod ramp;
 pub mod runs;
 pub mod tiles;
 pub mod tonemap;

@@ -6,7 +6,6 @@
 mod colour;
 mod kernels;
 
-use super::filter::add_scaled;
 use super::{Measured, Pairs};
 use crate::math::Rgb;
 use colour::{Lab, aces, opponent};
@@ -150,10 +149,8 @@ impl<'a> Observer<'a> {
                     colours[2 * padded + i] = blue_yellow;
                 }
                 for (plane, (channel, kernel)) in out.chunks_mut(width).zip(self.kernels.along_rows()) {
-                    let start = channel * padded + reach - kernel.len() / 2;
-                    for (i, weight) in kernel.iter().enumerate() {
-                        add_scaled(plane, &colours[start + i..], *weight);
-                    }
+                    let first = channel * padded + reach;
+                    kernel.add(plane, |k| &colours[first.saturating_add_signed(k)..]);
                 }
             },
         );
@@ -165,11 +162,10 @@ impl<'a> Observer<'a> {
         let (width, height) = self.pairs.size();
         out.fill(0.0);
         for (plane, output, kernel) in self.kernels.along_columns() {
-            for (i, weight) in kernel.iter().enumerate() {
-                let row = (y + i).saturating_sub(kernel.len() / 2).min(height - 1);
-                let values = &rows[(row * PLANES + plane) * width..];
-                add_scaled(&mut out[output * width..(output + 1) * width], values, *weight);
-            }
+            kernel.add(&mut out[output * width..(output + 1) * width], |k| {
+                let row = y.saturating_add_signed(k).min(height - 1);
+                &rows[(row * PLANES + plane) * width..]
+            });
         }
     }
 

@@ -1,5 +1,6 @@
 //! The filters of LDR-FLIP: the eye's contrast sensitivity, and detectors of edges and points \[ANDERSSON20\].
 
+use crate::image::metrics::filter::add_scaled;
 use std::f64::consts::PI;
 
 /// Pixels per degree: a screen 0.7 m wide with 3,840 pixels across, seen from 0.7 m.
@@ -17,17 +18,57 @@ const LUMA: Term = Term { a: 1.0, b: 0.0047 };
 const RED_GREEN: Term = Term { a: 1.0, b: 0.0053 };
 const BLUE_YELLOW: [Term; 2] = [Term { a: 34.1, b: 0.04 }, Term { a: 13.5, b: 0.025 }];
 
-/// Filters in one dimension, each of odd length, its middle the pixel itself.
+/// A filter in one dimension. Derivatives are sums of differences: the square root that follows would make the rounding of weights that
+/// only nearly cancel visible in flat regions.
+pub(super) enum Kernel {
+    /// Weights from the farthest pixel on one side to the farthest on the other; an odd number.
+    Smooth(Vec<f32>),
+    /// Weights of v(k) - v(-k), k = 1, 2, ...
+    First(Vec<f32>),
+    /// Weights of v(k) + v(-k) - 2 v(0), k = 1, 2, ...
+    Second(Vec<f32>),
+}
+
+impl Kernel {
+    /// Adds the filtered values; `at` gives the values so many pixels away.
+    pub(super) fn add<'a>(&self, out: &mut [f32], at: impl Fn(isize) -> &'a [f32]) {
+        match self {
+            Kernel::Smooth(weights) => {
+                let reach = (weights.len() / 2) as isize;
+                for (k, weight) in (-reach..).zip(weights) {
+                    add_scaled(out, at(k), *weight);
+                }
+            }
+            Kernel::First(weights) => {
+                for (k, weight) in (1..).zip(weights) {
+                    for (out, (after, before)) in out.iter_mut().zip(at(k).iter().zip(at(-k))) {
+                        *out += weight * (after - before);
+                    }
+                }
+            }
+            Kernel::Second(weights) => {
+                for (k, weight) in (1..).zip(weights) {
+                    for ((out, middle), (after, before)) in out.iter_mut().zip(at(0)).zip(at(k).iter().zip(at(-k))) {
+                        *out += weight * ((after - middle) + (before - middle));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The filters.
 pub(super) struct Kernels {
-    luma: Vec<f32>,
-    red_green: Vec<f32>,
+    reach: usize,
+    luma: Kernel,
+    red_green: Kernel,
     /// Both terms along rows.
-    blue_yellow: [Vec<f32>; 2],
+    blue_yellow: [Kernel; 2],
     /// Both terms along columns, times their share in the sum.
-    blue_yellow_shares: [Vec<f32>; 2],
-    gauss: Vec<f32>,
-    first: Vec<f32>,
-    second: Vec<f32>,
+    blue_yellow_shares: [Kernel; 2],
+    gauss: Kernel,
+    first: Kernel,
+    second: Kernel,
 }
 
 impl Kernels {
@@ -45,24 +86,27 @@ impl Kernels {
             let weight = |x: f64| derivative(x) * (-x * x / (2.0 * deviation * deviation)).exp();
             (-reach..=reach).map(|x| weight(x as f64)).collect()
         };
+        let smooth = |weights: &[f64], sum: f64| Kernel::Smooth(normalised(weights, sum));
+        let half = |weights: Vec<f32>| weights[weights.len() / 2 + 1..].to_vec();
         Self {
-            luma: normalised(&LUMA.weights(radius), 1.0),
-            red_green: normalised(&RED_GREEN.weights(radius), 1.0),
-            blue_yellow: [0, 1].map(|i| normalised(&terms[i].0, 1.0)),
-            blue_yellow_shares: [0, 1].map(|i| normalised(&terms[i].0, share(i))),
-            gauss: normalised(&feature(&|_| 1.0), 1.0),
-            first: normalised(&feature(&|x| -x), 1.0),
-            second: normalised(&feature(&|x| x * x / (deviation * deviation) - 1.0), 1.0),
+            reach: radius.max(reach) as usize,
+            luma: smooth(&LUMA.weights(radius), 1.0),
+            red_green: smooth(&RED_GREEN.weights(radius), 1.0),
+            blue_yellow: [0, 1].map(|i| smooth(&terms[i].0, 1.0)),
+            blue_yellow_shares: [0, 1].map(|i| smooth(&terms[i].0, share(i))),
+            gauss: smooth(&feature(&|_| 1.0), 1.0),
+            first: Kernel::First(half(normalised(&feature(&|x| -x), 1.0))),
+            second: Kernel::Second(half(normalised(&feature(&|x| x * x / (deviation * deviation) - 1.0), 1.0))),
         }
     }
 
     /// Pixels beyond a border that a filter may ask for.
     pub(super) fn reach(&self) -> usize {
-        self.luma.len() / 2
+        self.reach
     }
 
     /// Channel of the opponent colour and filter, for each plane of the pass along rows.
-    pub(super) fn along_rows(&self) -> [(usize, &[f32]); super::PLANES] {
+    pub(super) fn along_rows(&self) -> [(usize, &Kernel); super::PLANES] {
         [
             (0, &self.luma),
             (1, &self.red_green),
@@ -75,7 +119,7 @@ impl Kernels {
     }
 
     /// Plane of the pass along rows, output and filter, for each addition of the pass along columns.
-    pub(super) fn along_columns(&self) -> [(usize, usize, &[f32]); 8] {
+    pub(super) fn along_columns(&self) -> [(usize, usize, &Kernel); 8] {
         [
             (0, 0, &self.luma),
             (1, 1, &self.red_green),
