@@ -3,9 +3,11 @@
 use super::failure::{Failure, Outcome};
 use super::options::positive;
 use super::output::{print, print_json, table};
+use super::over_runs::OverRuns;
 use crate::image::exr::read_picture;
 use crate::image::metrics::{EPSILON, METRICS, Measured, Pairs};
 use crate::image::picture::Picture;
+use crate::image::runs::Runs;
 use clap::Args;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
@@ -26,6 +28,9 @@ pub(super) struct CompareArgs {
     /// Epsilon of relmse, relmse_trimmed, mape and smape
     #[arg(long, value_name = "E", default_value_t = EPSILON, value_parser = positive)]
     epsilon: f64,
+    /// Take the images as independent runs of one method: adds nsd, variance and squared bias
+    #[arg(long)]
+    runs: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -34,6 +39,7 @@ pub(super) struct CompareArgs {
 /// What the reference's own noise adds to an error, on average.
 struct Floor {
     path: PathBuf,
+    variance: Picture,
     mse: f64,
     relmse: f64,
 }
@@ -50,18 +56,29 @@ struct Row {
 pub(super) fn run(arguments: &CompareArgs) -> Outcome {
     let reference = read_picture(&arguments.reference)?;
     let floor = floor(arguments, &reference)?;
+    if arguments.runs && arguments.images.len() < 2 {
+        return Err(Failure::new("--runs takes two images or more: one run says nothing of its variance"));
+    }
     let mut rows = Vec::new();
+    let mut runs = Runs::new(reference.width, reference.height);
     for path in &arguments.images {
         let image = read_picture(path)?;
         let pairs = Pairs::new(&reference, &image)
             .map_err(|e| Failure::new(format!("{}: {e} ({})", path.display(), arguments.reference.display())))?;
+        if arguments.runs {
+            runs.add(&image).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        }
         let values = METRICS.iter().map(|m| m.measure(&pairs, arguments.epsilon)).collect();
         rows.push(Row { path: path.clone(), values, masked: pairs.masked(), pixels: pairs.pixels() });
     }
+    let variance = floor.as_ref().map(|f| &f.variance);
+    let over_runs = if arguments.runs { Some(OverRuns::measure(&runs, &reference, variance, arguments.epsilon)?) } else { None };
     if arguments.json {
-        print_json(&to_json(arguments, &floor, &rows))?
+        let mut document = to_json(arguments, &floor, &rows);
+        document["runs"] = over_runs.map_or(Value::Null, |o| o.to_json());
+        print_json(&document)?
     } else {
-        print(&to_text(arguments, &floor, &rows))?
+        print(&(to_text(arguments, &floor, &rows) + &over_runs.map_or_else(String::new, |o| o.to_text())))?
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -80,7 +97,7 @@ fn floor(arguments: &CompareArgs, reference: &Picture) -> Result<Option<Floor>, 
     // The reference's noise is independent of the image's: its variance adds to every expected squared difference.
     let mse = pairs.mean(|variance, _| variance).value;
     let relmse = pairs.mean(|variance, r| variance / (r * r + arguments.epsilon)).value;
-    Ok(mse.zip(relmse).map(|(mse, relmse)| Floor { path, mse, relmse }))
+    Ok(mse.zip(relmse).map(|(mse, relmse)| Floor { path, variance, mse, relmse }))
 }
 
 fn to_json(arguments: &CompareArgs, floor: &Option<Floor>, rows: &[Row]) -> Value {
@@ -100,13 +117,18 @@ fn to_json(arguments: &CompareArgs, floor: &Option<Floor>, rows: &[Row]) -> Valu
     json!({
         "reference": arguments.reference.display().to_string(),
         "epsilon": arguments.epsilon,
+        "formulas": METRICS.iter().map(|m| (m.name.to_string(), m.formula.into())).collect::<Map<String, Value>>(),
         "reference_var": floor.as_ref().map(|f| json!({"file": f.path.display().to_string(), "mse": f.mse, "relmse": f.relmse})),
         "images": rows.iter().map(image).collect::<Vec<_>>(),
     })
 }
 
+/// A number in a table; a dash where there is none.
+pub(super) fn number(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_string(), |v| format!("{v:.5e}"))
+}
+
 fn to_text(arguments: &CompareArgs, floor: &Option<Floor>, rows: &[Row]) -> String {
-    let number = |value: Option<f64>| value.map_or_else(|| "-".to_string(), |v| format!("{v:.5e}"));
     let mut lines = vec![std::iter::once("image").chain(METRICS.iter().map(|m| m.name)).map(str::to_owned).collect::<Vec<_>>()];
     lines[0].push("masked".to_string());
     for row in rows {
@@ -116,9 +138,12 @@ fn to_text(arguments: &CompareArgs, floor: &Option<Floor>, rows: &[Row]) -> Stri
         lines.push(line);
     }
     let with_epsilon: Vec<&str> = METRICS.iter().filter(|m| m.uses_epsilon).map(|m| m.name).collect();
-    let mut text = table(&lines);
-    text += &format!("\nreference {}; epsilon {} in {}\n", arguments.reference.display(), arguments.epsilon, with_epsilon.join(", "));
-    if let Some(Floor { path, mse, relmse }) = floor {
+    let mut text = table(&lines) + "\n";
+    for metric in METRICS {
+        text += &format!("{:<14}  {}\n", metric.name, metric.formula);
+    }
+    text += &format!("reference {}; epsilon e = {} in {}\n", arguments.reference.display(), arguments.epsilon, with_epsilon.join(", "));
+    if let Some(Floor { path, mse, relmse, .. }) = floor {
         text += &format!("of these the reference's own noise ({}) adds {mse:.5e} to mse and {relmse:.5e} to relmse\n", path.display());
     }
     for row in rows {

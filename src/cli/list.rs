@@ -2,7 +2,7 @@
 
 use super::failure::Outcome;
 use super::output::{print, print_json, table};
-use crate::image::metrics::{Better, METRICS};
+use crate::image::metrics::{Better, definitions};
 use crate::integrators::Method;
 use crate::integrators::photon_settings::SamplerName;
 use crate::scene::mitsuba::supported;
@@ -61,7 +61,9 @@ impl Table {
                 SamplerName::value_variants().iter().filter_map(value).map(row).collect()
             }
             Table::Bsdfs => supported().into_iter().filter(|(kind, _)| *kind == "bsdf").map(|(_, name)| json!({"name": name})).collect(),
-            Table::Metrics => METRICS.iter().map(|m| json!({"name": m.name, "formula": m.formula, "better": better(m.better)})).collect(),
+            Table::Metrics => definitions()
+                .map(|(name, formula, direction)| json!({"name": name, "formula": formula, "better": better(direction)}))
+                .collect(),
         }
     }
 }

@@ -7,6 +7,7 @@ mod info;
 mod list;
 mod options;
 mod output;
+mod over_runs;
 pub mod processor;
 mod render;
 mod scene;

@@ -1,9 +1,11 @@
-//! Images: the film's sums and counts, EXR files with metadata, metrics, tone mapping.
+//! Images: the film's sums and counts, EXR files with metadata, metrics, what several runs say together, tone mapping.
 
 pub mod exr;
 pub mod file;
 pub mod film;
 pub mod metrics;
 pub mod picture;
+pub mod ramp;
+pub mod runs;
 pub mod tiles;
 pub mod tonemap;

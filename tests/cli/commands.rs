@@ -1,7 +1,7 @@
 //! Help, `compare`, `info`, `list`, `completions`.
 
 use crate::bench::Bench;
-use isophote::image::metrics::METRICS;
+use isophote::image::metrics::{METRICS, definitions};
 use isophote::integrators::METHODS;
 use isophote::math::Rgb;
 
@@ -52,7 +52,38 @@ fn compare_prints_the_metrics_of_hand_made_images() {
     let other = bench.json(&["compare", "r.mean.exr", "x.exr", "--epsilon", "1", "--json"]);
     assert_eq!(other["images"][0]["relmse"].as_f64().unwrap(), (1.0 + 4.0 / 5.0) / 3.0);
     let table = bench.succeed(&["compare", "r.mean.exr", "x.exr", "--epsilon", "0.5"]);
-    assert!(METRICS.iter().all(|m| table.contains(m.name)) && table.contains("epsilon 0.5"), "{table}");
+    assert!(METRICS.iter().all(|m| table.contains(m.name)) && table.contains("epsilon e = 0.5"), "{table}");
+    assert!(METRICS.iter().all(|m| table.contains(m.formula)), "{table}");
+}
+
+#[test]
+fn compare_takes_images_as_runs() {
+    let bench = Bench::new();
+    bench.write("r.mean.exr", 1, vec![Rgb::splat(2.0)]);
+    bench.write("r.var.exr", 1, vec![Rgb::splat(0.25)]);
+    for (name, value) in [("a.exr", 1.0), ("b.exr", 2.0), ("c.exr", 6.0)] {
+        bench.write(name, 1, vec![Rgb::splat(value)]);
+    }
+    let command = ["compare", "r.mean.exr", "a.exr", "b.exr", "c.exr", "--runs", "--epsilon", "3"];
+    let runs = bench.json(&[&command[..], &["--json"]].concat())["runs"].clone();
+    // Mean 3, s^2 = 7, s_r^2 = 1/4; over r^2 + 3 = 7.
+    let check = |key: &str, expected: f64| {
+        let found = runs.pointer(key).unwrap().as_f64().unwrap();
+        assert!((found - expected).abs() < 1e-12, "{key}: {found}, by hand {expected}");
+    };
+    check("/count", 3.0);
+    check("/nsd", 7.0_f64.sqrt() / 3.0);
+    check("/absolute/mse", 17.0 / 3.0);
+    check("/absolute/variance", 7.0);
+    check("/absolute/bias2", 1.0 - 7.0 / 3.0 - 0.25);
+    check("/absolute/reference_variance", 0.25);
+    check("/relative/variance", 1.0);
+    let text = bench.succeed(&command);
+    assert!(text.contains("nsd 8.81917e-1 over 3 runs") && text.contains("-1.58333e0"), "{text}");
+    assert!(bench.json(&["compare", "r.mean.exr", "a.exr", "--json"])["runs"].is_null());
+    let refused = bench.run(&["compare", "r.mean.exr", "a.exr", "--runs"]);
+    let error = String::from_utf8_lossy(&refused.stderr);
+    assert!(!refused.status.success() && error.contains("two images or more"), "{error}");
 }
 
 #[test]
@@ -79,7 +110,7 @@ fn list_names_everything_there_is() {
     let all = bench.json(&["list", "--json"]);
     let names = |table: &str| -> Vec<&str> { all[table].as_array().unwrap().iter().map(|row| row["name"].as_str().unwrap()).collect() };
     assert_eq!(names("methods"), METHODS.iter().map(|m| m.name).collect::<Vec<_>>());
-    assert_eq!(names("metrics"), METRICS.iter().map(|m| m.name).collect::<Vec<_>>());
+    assert_eq!(names("metrics"), definitions().map(|(name, _, _)| name).collect::<Vec<_>>());
     assert!(names("samplers").contains(&"uniform") && names("bsdfs").contains(&"diffuse"));
     let text = bench.succeed(&["list"]);
     for table in ["methods", "samplers", "bsdfs", "metrics"] {

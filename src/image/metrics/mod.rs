@@ -1,8 +1,16 @@
 //! How far an image is from a reference. One table; the command line, `list` and the error record walk it.
 //!
-//! All metrics run over linear values, per channel, and are averaged over pixels and channels; `x` is the image tested, `r` the reference.
+//! All but `ssim` and `flip` run over linear values, per channel, and are averaged over pixels and channels; `x` is the image tested, `r`
+//! the reference. Those two look at a window around every pixel; what they do with masked pixels stands at [`Pairs::masked_at`].
+
+mod filter;
+mod flip;
+mod ssim;
 
 use super::picture::Picture;
+use crate::math::Rgb;
+
+pub use flip::{Exposures, flip_exposures, flip_map, ldr_flip_map};
 
 /// Which way a metric improves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +46,29 @@ pub const METRICS: &[Metric] = &[
     lower("mape", "mean |x-r|/(|r|+e)", true, |pairs, e| pairs.mean(|x, r| (x - r).abs() / (r.abs() + e))),
     lower("smape", "mean 2|x-r|/(|x|+|r|+2e)", true, |pairs, e| pairs.mean(|x, r| 2.0 * (x - r).abs() / (x.abs() + r.abs() + 2.0 * e))),
     lower("srrmse", "sqrt(mean ((x-r)/((x+r)/2))^2); where x+r <= 0: 0 if x = r, else left out", false, srrmse),
+    Metric {
+        name: "ssim",
+        formula: "mean over full 11x11 Gaussian windows, sigma 1.5, K1 0.01, K2 0.03, of the sRGB curve of luminance clamped to [0, 1]",
+        uses_epsilon: false,
+        better: Better::Higher,
+        measure: |pairs, _| ssim::ssim(pairs),
+    },
+    lower("flip", "HDR-FLIP: mean over pixels of the largest LDR-FLIP over exposures, ACES, 67.02 pixels per degree", false, |pairs, _| {
+        flip::flip(pairs)
+    }),
 ];
+
+/// The metric that no single image has: its name, formula and direction. [`super::runs::Runs::nsd`] measures it.
+pub const NSD: (&str, &str, Better) = (
+    "nsd",
+    "over runs: mean of standard deviation / mean; where the mean is <= 0: 0 if all runs agree, else left out (compare --runs)",
+    Better::Lower,
+);
+
+/// Name, formula and direction of every metric, those over runs included.
+pub fn definitions() -> impl Iterator<Item = (&'static str, &'static str, Better)> {
+    METRICS.iter().map(|m| (m.name, m.formula, m.better)).chain([NSD])
+}
 
 /// The epsilon of relmse, mape and smape unless another is asked for.
 pub const EPSILON: f64 = 0.01;
@@ -76,14 +106,16 @@ pub struct SizeMismatch {
 }
 
 /// The values of two pictures that can be compared: `x` of the image, `r` of the reference.
-pub struct Pairs {
+pub struct Pairs<'a> {
+    reference: &'a Picture,
+    image: &'a Picture,
     values: Vec<(f64, f64)>,
     masked: u64,
 }
 
-impl Pairs {
+impl<'a> Pairs<'a> {
     /// Pairs the values of two pictures. Pixels where either has an infinite component or a NaN are masked, with all their components.
-    pub fn new(reference: &Picture, image: &Picture) -> Result<Self, SizeMismatch> {
+    pub fn new(reference: &'a Picture, image: &'a Picture) -> Result<Self, SizeMismatch> {
         if reference.size() != image.size() {
             return Err(SizeMismatch { image: image.size(), reference: reference.size() });
         }
@@ -96,7 +128,28 @@ impl Pairs {
                 masked += 1;
             }
         }
-        Ok(Self { values, masked })
+        Ok(Self { reference, image, values, masked })
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        self.reference.size()
+    }
+
+    /// Whether a pixel, counted row by row, is masked. Metrics with a window average nothing there, and see no difference there from
+    /// windows around: both pictures show the reference's pixel, or black where that is not finite.
+    pub fn masked_at(&self, pixel: usize) -> bool {
+        !(self.reference.pixels[pixel].is_finite() && self.image.pixels[pixel].is_finite())
+    }
+
+    /// A pixel of the reference and of the image as metrics with a window see them.
+    fn shown(&self, pixel: usize) -> (Rgb, Rgb) {
+        let (r, x) = (self.reference.pixels[pixel], self.image.pixels[pixel]);
+        match (r.is_finite(), x.is_finite()) {
+            (true, true) => (r, x),
+            (true, false) => (r, r),
+            (false, _) => (Rgb::BLACK, Rgb::BLACK),
+        }
     }
 
     /// Pixels masked because a component is not finite.
@@ -157,108 +210,4 @@ fn srrmse(pairs: &Pairs, _: f64) -> Measured {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::Rgb;
-
-    fn row(values: &[[f32; 3]]) -> Picture {
-        Picture::new(values.len(), 1, values.iter().map(|v| Rgb::from(*v)).collect())
-    }
-
-    fn value(name: &str, reference: &Picture, image: &Picture, epsilon: f64) -> Measured {
-        metric(name).expect("a metric").measure(&Pairs::new(reference, image).expect("one size"), epsilon)
-    }
-
-    /// The pictures of `tests/oracle/metrics.py`, made by the same integer arithmetic.
-    fn oracle_pictures() -> (Picture, Picture) {
-        let number = |i: u64, salt: u64| ((i * 2_654_435_761 + salt * 40_503) % 4_294_967_296 / 65_536) as f32;
-        let colours = |f: &dyn Fn(u64) -> f32| {
-            let pixels = (0..2000).map(|p| Rgb::new(f(3 * p), f(3 * p + 1), f(3 * p + 2))).collect();
-            Picture::new(50, 40, pixels)
-        };
-        let reference = colours(&|i| if i % 17 == 0 { 0.0 } else { number(i, 1) / 16384.0 });
-        let image = colours(&|i| {
-            let r = if i % 17 == 0 { 0.0 } else { number(i, 1) / 16384.0 };
-            let x = r + (number(i, 2) - 32768.0) / 65536.0;
-            if i % 101 == 0 {
-                -x
-            } else if i % 1009 == 0 {
-                100.0 * x
-            } else if i % 34 == 0 {
-                0.0
-            } else {
-                x
-            }
-        });
-        (reference, image)
-    }
-
-    #[test]
-    fn values_are_those_of_the_independent_script() {
-        let (reference, image) = oracle_pictures();
-        let stored: serde_json::Value = serde_json::from_str(include_str!("../../tests/oracle/metrics.json")).expect("JSON");
-        for (epsilon, key) in [(0.01, "0.01"), (0.5, "0.5")] {
-            for metric in METRICS {
-                let found = value(metric.name, &reference, &image, epsilon).value.expect("a value");
-                let expected = stored[key][metric.name].as_f64().expect("stored");
-                assert!((found / expected - 1.0).abs() < 1e-12, "{} at {epsilon}: {found}, the script {expected}", metric.name);
-            }
-        }
-        let left_out = value("srrmse", &reference, &image, 0.01).left_out;
-        assert_eq!(left_out, stored["srrmse_left_out"].as_u64().expect("stored"));
-    }
-
-    #[test]
-    fn two_values_by_hand() {
-        // One pixel: r = (0, 1, 2), x = (1, 1, 0).
-        let (reference, image) = (row(&[[0.0, 1.0, 2.0]]), row(&[[1.0, 1.0, 0.0]]));
-        let check = |name: &str, expected: f64| {
-            let found = value(name, &reference, &image, 0.01).value.expect("a value");
-            assert!((found - expected).abs() < 1e-12 * expected, "{name}: {found}, by hand {expected}");
-        };
-        check("mse", 5.0 / 3.0);
-        check("rmse", (5.0_f64 / 3.0).sqrt());
-        check("relmse", (100.0 + 4.0 / 4.01) / 3.0);
-        check("relmse_trimmed", (100.0 + 4.0 / 4.01) / 3.0);
-        check("mape", (100.0 + 2.0 / 2.01) / 3.0);
-        check("smape", (2.0 / 1.02 + 4.0 / 2.02) / 3.0);
-        check("srrmse", (8.0_f64 / 3.0).sqrt());
-    }
-
-    #[test]
-    fn equal_pictures_differ_by_nothing() {
-        let (reference, _) = oracle_pictures();
-        for metric in METRICS {
-            assert_eq!(value(metric.name, &reference, &reference, EPSILON), Measured { value: Some(0.0), left_out: 0 }, "{}", metric.name);
-        }
-    }
-
-    #[test]
-    fn pixels_that_are_not_finite_are_masked_whole_and_counted() {
-        let reference = row(&[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [f32::INFINITY, 0.0, 0.0], [5.0, 5.0, 5.0]]);
-        let image = row(&[[2.0, 2.0, 2.0], [f32::NAN, 9.0, 9.0], [0.0, 0.0, 0.0], [5.0, 5.0, 5.0]]);
-        let pairs = Pairs::new(&reference, &image).expect("one size");
-        assert_eq!((pairs.masked(), pairs.pixels()), (2, 2));
-        assert_eq!(value("mse", &reference, &image, EPSILON).value, Some(0.5));
-        let nothing = row(&[[f32::NAN; 3]]);
-        assert_eq!(value("mse", &nothing, &nothing, EPSILON).value, None);
-    }
-
-    #[test]
-    fn trimming_takes_the_floor() {
-        // 333 pixels: floor(0.999) = 0 values go; 334 pixels: floor(1.002) = 1 goes.
-        for (pixels, expected) in [(333, 1.0 / 999.0), (334, 0.0)] {
-            let reference = row(&vec![[0.0; 3]; pixels]);
-            let mut values = vec![[0.0; 3]; pixels];
-            values[7][1] = 1.0;
-            let found = value("relmse_trimmed", &reference, &row(&values), 1.0).value.expect("a value");
-            assert!((found - expected).abs() < 1e-15, "{pixels} pixels: {found}");
-        }
-    }
-
-    #[test]
-    fn sizes_must_agree() {
-        let mismatch = Pairs::new(&row(&[[0.0; 3]]), &row(&[[0.0; 3], [0.0; 3]])).err().expect("refused");
-        assert_eq!(mismatch.to_string(), "is 2x1 pixels, the reference 1x1");
-    }
-}
+mod tests;
