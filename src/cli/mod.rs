@@ -1,6 +1,7 @@
 //! Commands: arguments as typed, configuration as checked, one call. Exit status 0 done, 1 a check failed, 2 usage or bad input, 130 and 143
 //! interrupted with the work saved.
 
+mod common;
 mod compare;
 mod failure;
 mod info;

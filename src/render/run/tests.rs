@@ -56,9 +56,9 @@ struct Bench {
 fn bench(iterations: std::ops::Range<u64>) -> Bench {
     let folder = tempfile::tempdir().expect("a folder");
     let output = Output { path: folder.path().join("out.exr"), layers: Layers::default(), preview: None };
-    let budget = Budget { iterations, time: None };
+    let budget = Budget { iterations, time: None, light_paths: None };
     let (snapshots, size) = (Snapshots::None, (9, 6));
-    let plan = Plan { size, budget, seed: 1, snapshots, checkpoint: None, reference: None, output };
+    let plan = Plan { size, budget, seed: 1, snapshots, keep: true, checkpoint: None, reference: None, output };
     Bench { folder, plan }
 }
 
