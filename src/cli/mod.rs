@@ -12,6 +12,7 @@ pub mod processor;
 mod render;
 mod scene;
 mod signals;
+mod study;
 
 use crate::integrators::{METHODS, Method};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
@@ -68,6 +69,9 @@ fn command(methods: &'static [Method]) -> Command {
         .args([verbose, quiet.help("Tell nothing but errors")])
         .subcommand(render::command(methods))
         .subcommand(compare::CompareArgs::augment_args(Command::new("compare")).about("Metrics of images against a reference"))
+        .subcommand(
+            study::StudyArgs::augment_args(Command::new("study")).about("Renders scenes by methods by seeds, and goes on where it stopped"),
+        )
         .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
         .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
@@ -77,6 +81,7 @@ fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosi
     match matches.subcommand() {
         Some(("render", matches)) => render::run(matches, methods, verbosity),
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
+        Some(("study", matches)) => study::run(&parsed(matches)?, methods, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),
         Some(("list", matches)) => list::run(&parsed(matches)?, methods),
         Some(("completions", matches)) => completions(matches, methods),

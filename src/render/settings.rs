@@ -90,6 +90,12 @@ impl Changes {
             Value::Object(map) => map,
             _ => Map::new(),
         };
+        all.extend(self.shared_json(common, film));
+        Value::Object(all)
+    }
+
+    /// Those settings that are not the method's own.
+    pub fn shared_json(&self, common: &Common, film: &FilmSize) -> Map<String, Value> {
         let define: Map<String, Value> = self.define.iter().map(|(name, value)| (name.clone(), value.clone().into())).collect();
         let shared = json!({
             "resolution": [film.width, film.height],
@@ -101,10 +107,10 @@ impl Changes {
             "paths": common.paths.as_ref().map(typed),
             "define": define,
         });
-        if let Value::Object(shared) = shared {
-            all.extend(shared);
+        match shared {
+            Value::Object(shared) => shared,
+            _ => Map::new(),
         }
-        Value::Object(all)
     }
 }
 

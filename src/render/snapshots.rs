@@ -51,6 +51,17 @@ impl FromStr for Snapshots {
     }
 }
 
+impl std::fmt::Display for Snapshots {
+    /// As it is typed.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::PowersOfTwo => f.write_str("pow2"),
+            Self::Every(n) => write!(f, "every:{n}"),
+        }
+    }
+}
+
 impl Snapshots {
     /// Whether the film is kept after `done` iterations of this render.
     pub fn due(self, done: u64) -> bool {
