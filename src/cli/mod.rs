@@ -9,6 +9,7 @@ mod list;
 mod options;
 mod output;
 pub mod processor;
+mod reference;
 mod render;
 mod scene;
 mod signals;
@@ -68,6 +69,7 @@ fn command(methods: &'static [Method]) -> Command {
         .arg_required_else_help(true)
         .args([verbose, quiet.help("Tell nothing but errors")])
         .subcommand(render::command(methods))
+        .subcommand(reference::command(methods))
         .subcommand(compare::CompareArgs::augment_args(Command::new("compare")).about("Metrics of images against a reference"))
         .subcommand(
             study::StudyArgs::augment_args(Command::new("study")).about("Renders scenes by methods by seeds, and goes on where it stopped"),
@@ -80,6 +82,7 @@ fn command(methods: &'static [Method]) -> Command {
 fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosity) -> Outcome {
     match matches.subcommand() {
         Some(("render", matches)) => render::run(matches, methods, verbosity),
+        Some(("reference", matches)) => reference::run(matches, methods, verbosity),
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
         Some(("study", matches)) => study::run(&parsed(matches)?, methods, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),

@@ -31,10 +31,13 @@ pub fn short(hash: &str) -> &str {
 pub fn file_name(name: &str) -> String {
     const LONGEST: usize = 60;
     let safe = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
-    let plain: String = name.chars().map(safe).take(LONGEST).collect();
+    let mut plain: String = name.chars().map(safe).take(LONGEST).collect();
     let hidden = plain.starts_with('.');
     if plain == name && !hidden {
         return plain;
+    }
+    while plain.contains("--") {
+        plain = plain.replace("--", "-");
     }
     let hash = of_bytes(&[name.as_bytes()]);
     format!("{}-{}", plain.trim_start_matches('.').trim_end_matches('-'), hash.get(..6).unwrap_or(&hash))
