@@ -54,7 +54,10 @@ pub(super) fn run(arguments: &StudyArgs, methods: &'static [Method], verbosity: 
             return dry_run(arguments, &study, &folder);
         }
         rendering.store(true, Ordering::SeqCst);
-        let options = Options { command: std::env::args().collect(), retry: arguments.retry };
+        let options = Options {
+            command: std::env::args_os().map(|argument| argument.to_string_lossy().into_owned()).collect(),
+            retry: arguments.retry,
+        };
         let start = Instant::now();
         let summary = study.run(&folder, &options, watch(verbosity).as_mut(), &interrupt)?;
         let report = if summary.interrupted.is_none() { write_report(&folder)? } else { None };

@@ -97,7 +97,7 @@ const MISTAKES: &[(&str, &str, &[&str])] = &[
     ),
     (
         "seeds = 1\nBUDGET\nREST[report]\ninsets = [{ x = 0, y = 0, width = 4, height = 1 }]\n",
-        "8:34",
+        "8:35",
         &["width of an inset is 4", "fractions"],
     ),
     ("seeds = 1\nBUDGET\nREST[report]\nslope = { from = 4, to = 2 }\n", "8:26", &["to must be larger than from"]),

@@ -1,5 +1,6 @@
 //! One cell: an image, or the reason why there is none.
 
+use super::folder::clear;
 use super::{Cell, Steps, Study, Watch};
 use crate::render::{Interrupt, Layers, Metadata, Outcome, Output, Plan, Reference, SceneRecord, Snapshot, Snapshots, render};
 use crate::study::error::StudyError;
@@ -26,18 +27,20 @@ pub(super) fn render_cell(
     let path = folder.join(&image);
     let parent = path.parent().unwrap_or(folder);
     std::fs::create_dir_all(parent).map_err(StudyError::io(parent))?;
+    // A study killed here before may have kept more films than this time, if the budget is a time.
+    clear(&path)?;
     let mut record = blank(study, cell, hash);
     // What a method does is its own; the film and the integrator of a cell that panicked are dropped with it.
     let attempt = catch_unwind(AssertUnwindSafe(|| attempt(study, cell, &path, reference, watch, interrupt)));
     match attempt.unwrap_or_else(|payload| Err(format!("panicked: {}", said(payload.as_ref())))) {
         Ok(outcome) if outcome.interrupted.is_some() => {
-            remove(&path, &outcome.snapshots);
+            clear(&path)?;
             return Ok(None);
         }
         Ok(outcome) => fill(&mut record, outcome, &image, study.plan.keep),
         Err(error) => {
             // A failure after the first iteration has saved what there was; a failed cell has no image.
-            let _ = std::fs::remove_file(&path);
+            clear(&path)?;
             record.error = Some(error);
         }
     }
@@ -87,15 +90,6 @@ fn chain(error: &dyn std::error::Error) -> String {
 fn said(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or(payload.downcast_ref::<&str>().copied()).unwrap_or("without a message")
-}
-
-/// Deletes what an interrupted cell wrote.
-fn remove(path: &Path, snapshots: &[Snapshot]) {
-    // Whatever stays is replaced when the cell is rendered again.
-    let _ = std::fs::remove_file(path);
-    for snapshot in snapshots {
-        let _ = std::fs::remove_file(Snapshots::path(path, snapshot.iteration));
-    }
 }
 
 /// The record of a cell that has not begun.
