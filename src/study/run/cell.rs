@@ -37,7 +37,14 @@ pub(super) fn render_cell(
             clear(&path)?;
             return Ok(None);
         }
-        Ok(outcome) => fill(&mut record, outcome, &image, study.plan.keep),
+        Ok(outcome) => {
+            // The last film is the final image, and is kept once.
+            let twice = Snapshots::path(&path, outcome.film.iterations());
+            if twice.is_file() {
+                std::fs::remove_file(&twice).map_err(StudyError::io(&twice))?;
+            }
+            fill(&mut record, outcome, &image, study.plan.keep);
+        }
         Err(error) => {
             // A failure after the first iteration has saved what there was; a failed cell has no image.
             clear(&path)?;
@@ -122,11 +129,10 @@ fn blank(study: &Study, cell: Cell, hash: &str) -> CellRecord {
 
 fn fill(record: &mut CellRecord, outcome: Outcome, image: &Path, keep: Keep) {
     let Outcome { film, metadata, snapshots, .. } = outcome;
-    let last = snapshots.last().map_or(0, |snapshot| snapshot.iteration);
-    let image_at = |snapshot: &Snapshot, due: bool| match keep {
-        Keep::Snapshots if due => Some(Snapshots::path(image, snapshot.iteration)),
-        _ if snapshot.iteration == last => Some(image.to_path_buf()),
-        _ => None,
+    let image_at = |iteration: u64| match keep {
+        _ if iteration == film.iterations() => Some(image.to_path_buf()),
+        Keep::Snapshots => Some(Snapshots::path(image, iteration)),
+        Keep::Final => None,
     };
     record.status = Status::Done;
     record.iterations = film.iterations();
@@ -139,7 +145,7 @@ fn fill(record: &mut CellRecord, outcome: Outcome, image: &Path, keep: Keep) {
     record.rejected = metadata.rejected;
     record.image = Some(image.to_path_buf());
     let snapshot_record = |snapshot: Snapshot| SnapshotRecord {
-        image: image_at(&snapshot, snapshot.iteration != last),
+        image: image_at(snapshot.iteration),
         iteration: snapshot.iteration,
         seconds: snapshot.seconds,
         cpu_seconds: snapshot.cpu_seconds,
