@@ -5,12 +5,13 @@ use super::options::positive;
 use super::output::{print, print_json, table};
 use super::over_runs::OverRuns;
 use crate::image::exr::read_picture;
+use crate::image::file::variance_beside;
 use crate::image::metrics::{EPSILON, METRICS, Measured, Pairs};
 use crate::image::picture::Picture;
 use crate::image::runs::Runs;
 use clap::Args;
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Arguments of `compare`.
@@ -81,12 +82,6 @@ pub(super) fn run(arguments: &CompareArgs) -> Outcome {
         print(&(to_text(arguments, &floor, &rows) + &over_runs.map_or_else(String::new, |o| o.to_text())))?
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// `NAME.var.exr` beside `NAME.mean.exr`, if it is there.
-fn variance_beside(reference: &Path) -> Option<PathBuf> {
-    let name = reference.file_name()?.to_str()?.strip_suffix(".mean.exr")?;
-    Some(reference.with_file_name(format!("{name}.var.exr"))).filter(|path| path.is_file())
 }
 
 fn floor(arguments: &CompareArgs, reference: &Picture) -> Result<Option<Floor>, Failure> {

@@ -4,6 +4,7 @@ use crate::image::picture::ImageError;
 use crate::integrators::MethodError;
 use crate::render::RenderError;
 use crate::scene::mitsuba::SceneError;
+use crate::study::error::StudyError;
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -76,6 +77,16 @@ impl From<RenderError> for Failure {
             _ => None,
         };
         Self { help: help.map(str::to_owned), ..Self::chain(&error) }
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Scene(error) => error.into(),
+            StudyError::Image(error) => error.into(),
+            error => Self { help: error.help(), ..Self::new(error.to_string()) },
+        }
     }
 }
 

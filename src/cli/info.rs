@@ -31,7 +31,7 @@ pub(super) fn run(arguments: &InfoArgs) -> Outcome {
     let document = if is_exr(&arguments.file)? {
         exr_json(&read_file(&arguments.file)?)?
     } else {
-        scene_json(&arguments.file, &scene::open(&arguments.file, &arguments.changes)?)
+        scene_json(&arguments.file, &scene::open(&arguments.file, &arguments.changes.changes())?)
     };
     if arguments.json {
         print_json(&document)?

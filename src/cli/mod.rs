@@ -1,6 +1,7 @@
 //! Commands: arguments as typed, configuration as checked, one call. Exit status 0 done, 1 a check failed, 2 usage or bad input, 130 and 143
 //! interrupted with the work saved.
 
+mod common;
 mod compare;
 mod failure;
 mod info;
@@ -9,9 +10,11 @@ mod options;
 mod output;
 mod over_runs;
 pub mod processor;
+mod reference;
 mod render;
 mod scene;
 mod signals;
+mod study;
 
 use crate::integrators::{METHODS, Method};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, value_parser};
@@ -67,7 +70,11 @@ fn command(methods: &'static [Method]) -> Command {
         .arg_required_else_help(true)
         .args([verbose, quiet.help("Tell nothing but errors")])
         .subcommand(render::command(methods))
+        .subcommand(reference::command(methods))
         .subcommand(compare::CompareArgs::augment_args(Command::new("compare")).about("Metrics of images against a reference"))
+        .subcommand(
+            study::StudyArgs::augment_args(Command::new("study")).about("Renders scenes by methods by seeds, and goes on where it stopped"),
+        )
         .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
         .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
@@ -76,7 +83,9 @@ fn command(methods: &'static [Method]) -> Command {
 fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosity) -> Outcome {
     match matches.subcommand() {
         Some(("render", matches)) => render::run(matches, methods, verbosity),
+        Some(("reference", matches)) => reference::run(matches, methods, verbosity),
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
+        Some(("study", matches)) => study::run(&parsed(matches)?, methods, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),
         Some(("list", matches)) => list::run(&parsed(matches)?, methods),
         Some(("completions", matches)) => completions(matches, methods),

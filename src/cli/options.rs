@@ -2,41 +2,6 @@
 
 use std::str::FromStr;
 
-/// `WxH`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Resolution {
-    /// Pixels across, positive.
-    pub(crate) width: u32,
-    /// Pixels down, positive.
-    pub(crate) height: u32,
-}
-
-impl FromStr for Resolution {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let size = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-        match size {
-            Some((width, height)) if width > 0 && height > 0 => Ok(Self { width, height }),
-            _ => Err("expected WIDTHxHEIGHT in pixels, as in 640x480".to_string()),
-        }
-    }
-}
-
-/// `X,Y,W,H`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Crop(pub(crate) [u32; 4]);
-
-impl FromStr for Crop {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
-        match numbers.as_deref() {
-            Some(&[x, y, width, height]) if width > 0 && height > 0 => Ok(Self([x, y, width, height])),
-            _ => Err("expected LEFT,TOP,WIDTH,HEIGHT in pixels, as in 100,50,64,64".to_string()),
-        }
-    }
-}
-
 /// `NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Define {
@@ -105,30 +70,16 @@ pub(crate) fn path_class(text: &str) -> Result<regex::Regex, String> {
     crate::transport::class::pattern(text).map_err(|e| e.to_string())
 }
 
-/// The pattern as it was typed.
-pub(crate) fn typed_class(pattern: &regex::Regex) -> &str {
-    let whole = pattern.as_str();
-    whole.strip_prefix("^(?:").and_then(|rest| rest.strip_suffix(")$")).unwrap_or(whole)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn values_are_read_and_mistakes_refused() {
-        assert_eq!("640x480".parse(), Ok(Resolution { width: 640, height: 480 }));
-        assert_eq!("1,2,3,4".parse(), Ok(Crop([1, 2, 3, 4])));
         assert_eq!("a=b=c".parse(), Ok(Define { name: "a".into(), value: "b=c".into() }));
         let sizes = [("4G", 4 << 30), ("500M", 500 << 20), ("1.5GiB", 3 << 29), ("12kb", 12 << 10), ("77", 77)];
         for (text, bytes) in sizes {
             assert_eq!(text.parse(), Ok(Size(bytes)), "{text}");
-        }
-        for text in ["640", "0x1", "x", "-1x2", "64x64x64"] {
-            assert!(text.parse::<Resolution>().is_err(), "{text}");
-        }
-        for text in ["1,2,3", "1,2,0,4", "a,b,c,d"] {
-            assert!(text.parse::<Crop>().is_err(), "{text}");
         }
         for text in ["", "G", "-1G", "1e40G", "nan", "é", "4é"] {
             assert!(text.parse::<Size>().is_err(), "{text}");
@@ -148,6 +99,5 @@ mod tests {
         assert!(class.is_match("LSSDE") && class.is_match("LD"));
         assert!(!class.is_match("LDE") && !class.is_match("ELD"));
         assert!(path_class("L(").is_err());
-        assert_eq!(typed_class(&class), "LD|LS+DE");
     }
 }

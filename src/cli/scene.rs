@@ -1,8 +1,9 @@
 //! Loading a scene with what the command line changes in it. The only place of this room that calls the loader.
 
 use super::failure::Failure;
-use super::options::{Crop, Define, Resolution};
-use crate::scene::mitsuba::{LoadOptions, LoadedScene, load};
+use super::options::Define;
+use crate::render::{Changes, Crop, Resolution};
+use crate::scene::mitsuba::{LoadedScene, load};
 use std::path::{Path, PathBuf};
 
 /// Options that change a scene.
@@ -30,13 +31,16 @@ pub(crate) struct SceneChanges {
 }
 
 /// Loads a scene.
-pub(crate) fn open(path: &Path, changes: &SceneChanges) -> Result<LoadedScene, Failure> {
-    let options = LoadOptions {
-        defines: changes.define.iter().map(|d| (d.name.clone(), d.value.clone())).collect(),
-        resolution: changes.resolution.map(|r| (r.width, r.height)),
-        crop: changes.crop.map(|c| c.0),
-    };
-    Ok(load(path, &options)?)
+pub(crate) fn open(path: &Path, changes: &Changes) -> Result<LoadedScene, Failure> {
+    Ok(load(path, &changes.load_options())?)
+}
+
+impl SceneChanges {
+    /// As checked.
+    pub(crate) fn changes(&self) -> Changes {
+        let define = self.define.iter().map(|d| (d.name.clone(), d.value.clone())).collect();
+        Changes { resolution: self.resolution, crop: self.crop, define, ..Changes::default() }
+    }
 }
 
 /// Bytes the scene holds.

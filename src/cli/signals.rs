@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) type Rendering = Arc<AtomicBool>;
 
 /// From now on SIGINT and SIGTERM ask the render to end instead of ending the program; further ones change nothing, so that a save under way is
-/// never cut short. Until the flag returned is set there is nothing to save, and the program ends at once.
-pub(crate) fn listen(interrupt: &Interrupt, verbosity: Verbosity) -> Result<Rendering, Failure> {
+/// never cut short; `what` says what comes then. Until the flag returned is set there is nothing to save, and the program ends at once.
+pub(crate) fn listen(interrupt: &Interrupt, verbosity: Verbosity, what: &'static str) -> Result<Rendering, Failure> {
     let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(|e| Failure::new(format!("cannot listen for signals: {e}")))?;
     let interrupt = interrupt.clone();
     let rendering = Rendering::default();
@@ -24,7 +24,7 @@ pub(crate) fn listen(interrupt: &Interrupt, verbosity: Verbosity) -> Result<Rend
                 std::process::exit(status(signal).into());
             }
             if verbosity != Verbosity::Quiet && interrupt.signal().is_none() {
-                eprintln!("\n{}: ending after the running iteration and saving", name(signal));
+                eprintln!("\n{}: {what}", name(signal));
             }
             interrupt.raise(signal);
         }

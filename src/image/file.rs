@@ -37,6 +37,12 @@ fn target_of(path: &Path) -> Result<PathBuf, ImageError> {
     }
 }
 
+/// `NAME.var.exr` beside a mean `NAME.mean.exr`, if it is there.
+pub fn variance_beside(mean: &Path) -> Option<PathBuf> {
+    let name = mean.file_name()?.to_str()?.strip_suffix(".mean.exr")?;
+    Some(mean.with_file_name(format!("{name}.var.exr"))).filter(|path| path.is_file())
+}
+
 /// Whether [`replace`] could write this file, found out before anything is rendered.
 pub fn check_writable(path: &Path) -> Result<(), ImageError> {
     let target = target_of(path)?;

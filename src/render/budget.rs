@@ -28,13 +28,15 @@ impl FromStr for IterationRange {
     }
 }
 
-/// Iterations and seconds; whichever ends first.
+/// Iterations, seconds and light paths; whichever ends first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Budget {
     /// Iterations to render; an end of `u64::MAX` is none.
     pub iterations: Range<u64>,
     /// Seconds of render time, positive.
     pub time: Option<f64>,
+    /// Light subpaths, start-up counted; the iteration that reaches the number is the last.
+    pub light_paths: Option<u64>,
 }
 
 impl Budget {
@@ -45,7 +47,12 @@ impl Budget {
             (None, Some(_)) => 0..u64::MAX,
             (None, None) => 0..default.max(1),
         };
-        Self { iterations, time }
+        Self { iterations, time, light_paths: None }
+    }
+
+    /// Until so many light subpaths were traced.
+    pub fn of_light_paths(count: u64) -> Self {
+        Self { iterations: 0..u64::MAX, time: None, light_paths: Some(count) }
     }
 
     /// Number of iterations, if there is a last one.

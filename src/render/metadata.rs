@@ -8,6 +8,9 @@ use std::collections::BTreeMap;
 /// Version of the metadata's layout.
 pub const SCHEMA: u32 = 1;
 
+/// Key of the pixels left out, in [`ErrorRecord::values`].
+pub const MASKED: &str = "masked";
+
 /// Which scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneRecord {
@@ -47,7 +50,7 @@ impl ErrorRecord {
             values.insert(metric.name.to_string(), value.into());
         }
         if pairs.masked() > 0 {
-            values.insert("masked".to_string(), pairs.masked().into());
+            values.insert(MASKED.to_string(), pairs.masked().into());
         }
         Self { iteration, seconds, values }
     }

@@ -5,6 +5,7 @@ pub mod clock;
 pub mod metadata;
 pub mod progress;
 pub mod run;
+pub mod settings;
 pub mod snapshots;
 
 pub use budget::{Budget, IterationRange};
@@ -12,4 +13,5 @@ pub use clock::{Interrupt, RenderClock};
 pub use metadata::{ErrorRecord, Metadata, Run, SceneRecord};
 pub use progress::{Bar, Lines, Progress, Silent, Step};
 pub use run::{Layers, Outcome, Output, Plan, Reference, RenderError, render};
-pub use snapshots::Snapshots;
+pub use settings::{Changes, Crop, Resolution};
+pub use snapshots::{Snapshot, Snapshots};

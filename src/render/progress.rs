@@ -14,14 +14,16 @@ pub struct Step {
     pub seconds: f64,
     /// Render time allowed, seconds.
     pub limit: Option<f64>,
+    /// Share of the light paths asked for, if a number of them ends the render.
+    pub light_paths: Option<f64>,
 }
 
 impl Step {
-    /// Share of the work done, by iterations or by time, whichever is further.
+    /// Share of the work done, by iterations, time or light paths, whichever is furthest.
     pub fn share(&self) -> f64 {
         let by_count = self.total.map_or(0.0, |total| self.done as f64 / total as f64);
         let by_time = self.limit.map_or(0.0, |limit| self.seconds / limit);
-        by_count.max(by_time).min(1.0)
+        by_count.max(by_time).max(self.light_paths.unwrap_or(0.0)).min(1.0)
     }
 
     /// Seconds left, from the mean time of an iteration; `None` before the first.
@@ -31,10 +33,8 @@ impl Step {
         }
         let by_count = self.total.map(|total| total.saturating_sub(self.done) as f64 * self.seconds / self.done as f64);
         let by_time = self.limit.map(|limit| (limit - self.seconds).max(0.0));
-        match (by_count, by_time) {
-            (Some(count), Some(time)) => Some(count.min(time)),
-            (one, other) => one.or(other),
-        }
+        let by_paths = self.light_paths.filter(|share| *share > 0.0).map(|share| (self.seconds / share - self.seconds).max(0.0));
+        [by_count, by_time, by_paths].into_iter().flatten().reduce(f64::min)
     }
 
     /// `12/64 iterations, 3.4 it/s, 15 seconds left`.
@@ -136,12 +136,12 @@ mod tests {
 
     #[test]
     fn the_nearer_end_counts() {
-        let step = Step { done: 10, total: Some(100), seconds: 5.0, limit: Some(20.0) };
+        let step = Step { done: 10, total: Some(100), seconds: 5.0, limit: Some(20.0), light_paths: None };
         assert_eq!((step.share(), step.remaining()), (0.25, Some(15.0)));
         let step = Step { done: 50, ..step };
         assert_eq!((step.share(), step.remaining()), (0.5, Some(5.0)));
         assert_eq!(step.describe(), "50/100 iterations, 10.0 it/s, 5 seconds left");
-        let endless = Step { done: 2, total: None, seconds: 5.0, limit: None };
+        let endless = Step { done: 2, total: None, seconds: 5.0, limit: None, light_paths: None };
         assert_eq!((endless.share(), endless.remaining()), (0.0, None));
         assert_eq!(endless.describe(), "2 iterations, 2.5 s/it");
     }
@@ -151,7 +151,7 @@ mod tests {
         let mut out = Vec::new();
         let mut lines = Lines::new(&mut out, Duration::from_secs(3600));
         for done in 0..=9 {
-            lines.step(Step { done, total: Some(9), seconds: done as f64, limit: None });
+            lines.step(Step { done, total: Some(9), seconds: done as f64, limit: None, light_paths: None });
         }
         lines.finish();
         lines.finish();

@@ -2,9 +2,9 @@
 
 use super::budget::Budget;
 use super::clock::{Interrupt, RenderClock};
-use super::metadata::{ErrorRecord, Metadata, Run};
+use super::metadata::{ErrorRecord, MASKED, Metadata, Run};
 use super::progress::{Progress, Step};
-use super::snapshots::Snapshots;
+use super::snapshots::{Snapshot, Snapshots};
 use crate::image::exr::{self, Plane};
 use crate::image::film::Film;
 use crate::image::metrics::{EPSILON, Pairs, SizeMismatch};
@@ -12,6 +12,7 @@ use crate::image::picture::{ImageError, Picture};
 use crate::image::tonemap::{Exposure, write_png};
 use crate::integrators::{Integrator, IterationStats, MethodError};
 use crate::math::Rgb;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -42,6 +43,14 @@ pub enum RenderError {
         method: String,
         /// First iteration asked for.
         start: u64,
+    },
+    /// A number of light paths, for a method that traces none.
+    #[error("{method} traces no light paths, so a budget of {budget} of them never ends: give it iterations or seconds")]
+    NoLightPaths {
+        /// The method's name.
+        method: String,
+        /// Light paths asked for.
+        budget: u64,
     },
 }
 
@@ -105,8 +114,10 @@ pub struct Plan {
     pub budget: Budget,
     /// Seed, for the record.
     pub seed: u64,
-    /// Which films to keep.
+    /// After which iterations to measure.
     pub snapshots: Snapshots,
+    /// Whether the film is written after each of them, beside the output.
+    pub keep: bool,
     /// Seconds of wall time between saves of the unfinished image.
     pub checkpoint: Option<Duration>,
     /// Reference of the error record.
@@ -122,6 +133,8 @@ pub struct Outcome {
     pub film: Film,
     /// As written.
     pub metadata: Metadata,
+    /// The film at each snapshot and at the end, ascending by iteration.
+    pub snapshots: Vec<Snapshot>,
     /// Pixels of the image with a component that is infinite or NaN.
     pub non_finite: u64,
     /// The signal that ended it early.
@@ -150,14 +163,15 @@ pub fn render(
         return Err(RenderError::Stateful { method: metadata.method, start });
     }
     let film = Film::new(plan.size.0, plan.size.1, plan.output.layers.variance);
-    let mut session = Session { plan, film, metadata, clock: RenderClock::default(), stats: IterationStats::default(), done: 0 };
+    let (clock, stats) = (RenderClock::default(), IterationStats::default());
+    let mut session = Session { plan, film, metadata, snapshots: Vec::new(), clock, stats, done: 0 };
     let result = session.iterate(method, progress, interrupt);
     progress.finish();
     let saved = if session.done > 0 { session.record().and_then(|()| session.save(&plan.output.path)) } else { Ok(()) };
     let interrupted = result?;
     saved?;
     let non_finite = session.film.mean().iter().filter(|p| !p.is_finite()).count() as u64;
-    Ok(Outcome { film: session.film, metadata: session.metadata, non_finite, interrupted })
+    Ok(Outcome { film: session.film, metadata: session.metadata, snapshots: session.snapshots, non_finite, interrupted })
 }
 
 /// A render in progress.
@@ -165,6 +179,7 @@ struct Session<'a> {
     plan: &'a Plan,
     film: Film,
     metadata: Metadata,
+    snapshots: Vec<Snapshot>,
     clock: RenderClock,
     stats: IterationStats,
     done: u64,
@@ -187,7 +202,7 @@ impl Session<'_> {
         self.metadata.radius = method.radius();
         let mut last_save = Instant::now();
         for i in self.plan.budget.iterations.clone() {
-            if self.done > 0 && self.out_of_time() {
+            if self.done > 0 && self.spent()? {
                 break;
             }
             if let Some(signal) = interrupt.signal() {
@@ -218,21 +233,40 @@ impl Session<'_> {
     fn keep(&mut self) -> Result<(), RenderError> {
         if self.plan.snapshots.due(self.done) {
             self.record()?;
-            self.save(&Snapshots::path(&self.plan.output.path, self.done))?;
+            if self.plan.keep {
+                self.save(&Snapshots::path(&self.plan.output.path, self.done))?;
+            }
         }
         Ok(())
     }
 
-    /// Measures against the reference, if that is not done yet for this film.
+    /// Counts and measures, if that is not done yet for this film.
     fn record(&mut self) -> Result<(), RenderError> {
-        let Some(Reference { path, picture }) = &self.plan.reference else { return Ok(()) };
-        if self.metadata.errors.last().is_some_and(|record| record.iteration == self.done) {
+        if self.snapshots.last().is_some_and(|snapshot| snapshot.iteration == self.done) {
             return Ok(());
         }
+        let error = self.measure()?;
+        let values = error.iter().flat_map(|e| &e.values).filter(|(key, _)| *key != MASKED);
+        self.snapshots.push(Snapshot {
+            iteration: self.done,
+            seconds: self.clock.seconds(),
+            cpu_seconds: self.clock.cpu_seconds(),
+            light_paths: self.stats.light_paths,
+            camera_paths: self.stats.camera_paths,
+            rays: self.stats.rays,
+            values: values.map(|(key, value)| (key.clone(), value.as_f64())).collect(),
+            masked: error.as_ref().and_then(|e| e.values.get(MASKED)).and_then(Value::as_u64).unwrap_or(0),
+        });
+        self.metadata.errors.extend(error);
+        Ok(())
+    }
+
+    /// The error against the reference, if there is one.
+    fn measure(&self) -> Result<Option<ErrorRecord>, RenderError> {
+        let Some(Reference { path, picture }) = &self.plan.reference else { return Ok(None) };
         let image = Picture::new(self.film.width(), self.film.height(), self.film.mean());
         let pairs = Pairs::new(picture, &image).map_err(|source| RenderError::Reference { path: path.clone(), source })?;
-        self.metadata.errors.push(ErrorRecord::measure(self.done, self.clock.seconds(), &pairs, EPSILON));
-        Ok(())
+        Ok(Some(ErrorRecord::measure(self.done, self.clock.seconds(), &pairs, EPSILON)))
     }
 
     /// Writes the film as it stands.
@@ -250,12 +284,21 @@ impl Session<'_> {
         Ok(self.plan.output.write(path, &self.film, &self.metadata)?)
     }
 
-    fn out_of_time(&self) -> bool {
-        self.plan.budget.time.is_some_and(|limit| self.clock.seconds() >= limit)
+    /// Whether the time or the light paths are used up.
+    fn spent(&self) -> Result<bool, RenderError> {
+        let Budget { time, light_paths, .. } = self.plan.budget;
+        if let Some(budget) = light_paths
+            && self.stats.light_paths == 0
+        {
+            return Err(RenderError::NoLightPaths { method: self.metadata.method.clone(), budget });
+        }
+        Ok(time.is_some_and(|limit| self.clock.seconds() >= limit) || light_paths.is_some_and(|limit| self.stats.light_paths >= limit))
     }
 
     fn step(&self) -> Step {
-        Step { done: self.done, total: self.plan.budget.total(), seconds: self.clock.seconds(), limit: self.plan.budget.time }
+        let budget = &self.plan.budget;
+        let light_paths = budget.light_paths.map(|limit| self.stats.light_paths as f64 / limit as f64);
+        Step { done: self.done, total: budget.total(), seconds: self.clock.seconds(), limit: budget.time, light_paths }
     }
 }
 

@@ -1,9 +1,31 @@
-//! Films kept on the way.
+//! Films measured and kept on the way.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// After which iterations the film is kept.
+/// A film on the way, or the last one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Snapshot {
+    /// Iterations in the film.
+    pub iteration: u64,
+    /// Render time until then, wall seconds.
+    pub seconds: f64,
+    /// Processor seconds over the same spans, all threads.
+    pub cpu_seconds: f64,
+    /// Light subpaths until then, start-up counted.
+    pub light_paths: u64,
+    /// Camera subpaths until then.
+    pub camera_paths: u64,
+    /// Rays until then.
+    pub rays: u64,
+    /// Value by metric; `None` where none could be computed; empty without a reference.
+    pub values: BTreeMap<String, Option<f64>>,
+    /// Pixels left out because a component is not finite here or in the reference.
+    pub masked: u64,
+}
+
+/// After which iterations the film is measured or kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Snapshots {
     /// Never.
@@ -25,6 +47,17 @@ impl FromStr for Snapshots {
                 Some(Ok(n)) if n > 0 => Ok(Self::Every(n)),
                 _ => Err("expected none, pow2 or every:N with N > 0".to_string()),
             },
+        }
+    }
+}
+
+impl std::fmt::Display for Snapshots {
+    /// As it is typed.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::None => f.write_str("none"),
+            Self::PowersOfTwo => f.write_str("pow2"),
+            Self::Every(n) => write!(f, "every:{n}"),
         }
     }
 }

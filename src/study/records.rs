@@ -2,6 +2,10 @@
 //!
 //! A report is made from these lines and the pictures they name, and from nothing else.
 
+mod file;
+
+pub use file::{RecordFile, RecordsError, read};
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;

@@ -54,6 +54,12 @@ pub fn pattern(text: &str) -> Result<Regex, regex::Error> {
     Regex::new(&format!("^(?:{text})$"))
 }
 
+/// A [`pattern`] as it was typed.
+pub fn typed(pattern: &Regex) -> &str {
+    let whole = pattern.as_str();
+    whole.strip_prefix("^(?:").and_then(|rest| rest.strip_suffix(")$")).unwrap_or(whole)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,5 +75,6 @@ mod tests {
         assert!(class.join(b"SS", &pattern("LS+DSE").unwrap()));
         class.pop();
         assert!(class.matches(&pattern("LS?E").unwrap()));
+        assert_eq!(typed(&pattern("LD|LS+DE").unwrap()), "LD|LS+DE");
     }
 }

@@ -56,9 +56,9 @@ struct Bench {
 fn bench(iterations: std::ops::Range<u64>) -> Bench {
     let folder = tempfile::tempdir().expect("a folder");
     let output = Output { path: folder.path().join("out.exr"), layers: Layers::default(), preview: None };
-    let budget = Budget { iterations, time: None };
+    let budget = Budget { iterations, time: None, light_paths: None };
     let (snapshots, size) = (Snapshots::None, (9, 6));
-    let plan = Plan { size, budget, seed: 1, snapshots, checkpoint: None, reference: None, output };
+    let plan = Plan { size, budget, seed: 1, snapshots, keep: true, checkpoint: None, reference: None, output };
     Bench { folder, plan }
 }
 
@@ -225,4 +225,56 @@ fn threads_change_no_bit() {
     for threads in [2, 4] {
         assert!(on(threads) == one, "{threads} threads");
     }
+}
+
+#[test]
+fn light_paths_end_it_with_the_iteration_that_reaches_them() {
+    // 1000 at the start, 54 an iteration.
+    for (budget, iterations) in [(1000, 1), (1054, 1), (1055, 2), (1000 + 54 * 5, 5)] {
+        let mut bench = bench(0..u64::MAX);
+        bench.plan.budget = Budget::of_light_paths(budget);
+        let outcome = bench.run(|_| (), &Interrupt::default());
+        assert_eq!((outcome.film.iterations(), outcome.metadata.light_paths), (iterations, 1000 + 54 * iterations), "{budget}");
+    }
+}
+
+#[test]
+fn a_number_of_light_paths_is_refused_where_there_are_none() {
+    struct Dark;
+    impl Integrator for Dark {
+        fn prepare(&mut self) -> Result<IterationStats, MethodError> {
+            Ok(IterationStats::default())
+        }
+        fn iterate(&mut self, _: u64, film: &mut Film) -> IterationStats {
+            film.add_eye_samples(|| (), |(), _, _| Rgb::BLACK, |()| ());
+            IterationStats::default()
+        }
+    }
+    let mut bench = bench(0..u64::MAX);
+    bench.plan.budget = Budget::of_light_paths(10);
+    let error = render(&mut Dark, &bench.plan, metadata(), &mut Silent, &Interrupt::default()).expect_err("it would never end");
+    assert!(matches!(error, RenderError::NoLightPaths { budget: 10, .. }), "{error}");
+}
+
+#[test]
+fn snapshots_are_measured_whether_kept_or_not() {
+    let mut bench = bench(0..6);
+    bench.plan.snapshots = Snapshots::PowersOfTwo;
+    bench.plan.keep = false;
+    let plain = bench.run(|_| (), &Interrupt::default());
+    assert_eq!(bench.files(), ["out.exr"]);
+    let counts: Vec<[u64; 4]> = plain.snapshots.iter().map(|s| [s.iteration, s.light_paths, s.camera_paths, s.rays]).collect();
+    assert_eq!(counts, [1, 2, 4, 6].map(|n| [n, 1000 + 54 * n, 54 * n, 108 * n]));
+    assert!(plain.snapshots.windows(2).all(|s| s[0].seconds < s[1].seconds && s[0].values.is_empty()));
+    assert_eq!(plain.snapshots[3].seconds, plain.metadata.seconds);
+    let mut pixels = vec![Rgb::splat(0.5); 54];
+    pixels[7] = Rgb::splat(f32::NAN);
+    bench.plan.reference = Some(Reference { path: "reference.exr".into(), picture: Picture::new(9, 6, pixels) });
+    let measured = bench.run(|_| (), &Interrupt::default());
+    for (snapshot, error) in measured.snapshots.iter().zip(&measured.metadata.errors) {
+        assert_eq!((snapshot.iteration, snapshot.masked, error.values[MASKED].as_u64()), (error.iteration, 1, Some(1)));
+        assert_eq!(snapshot.values.len() + 1, error.values.len());
+        assert!(snapshot.values.iter().all(|(key, value)| value.is_some() && error.values[key].as_f64() == *value));
+    }
+    assert_eq!(measured.snapshots.len(), 4);
 }

@@ -97,7 +97,7 @@ impl SceneError {
 pub(crate) type Result<T> = std::result::Result<T, SceneError>;
 
 /// "did you mean ..., or one of: ..." for a name that is none of `known`.
-pub(super) fn suggest(name: &str, known: &[&str]) -> String {
+pub(crate) fn suggest(name: &str, known: &[&str]) -> String {
     // A scene may have a million ids; nobody reads a list of them.
     const MOST_LISTED: usize = 40;
     let mut known: Vec<&str> = known.to_vec();

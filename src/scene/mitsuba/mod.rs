@@ -19,6 +19,7 @@ mod transform;
 mod xml;
 
 use error::Result;
+pub(crate) use error::suggest;
 pub use error::{Position, SceneError};
 
 use super::{Scene, SceneParts};
