@@ -13,7 +13,14 @@ use serde_json::json;
 use std::fmt::Write;
 
 /// The script, once a page, after the last section or deferred.
-pub const SCRIPT: &str = include_str!("viewer.js");
+pub const SCRIPT: &str = concat!(
+    "(() => {\n\"use strict\";\n",
+    include_str!("numbers.js"),
+    include_str!("viewer.js"),
+    include_str!("controls.js"),
+    include_str!("input.js"),
+    "})();\n"
+);
 
 /// The style, once a page. Every rule begins with `.viewer`.
 pub const STYLE: &str = include_str!("viewer.css");
