@@ -41,6 +41,25 @@ pub struct Rectangle {
     pub height: usize,
 }
 
+impl Rectangle {
+    /// This part of a picture.
+    ///
+    /// # Panics
+    /// If it reaches out of the picture.
+    pub fn crop(&self, picture: &Picture) -> Picture {
+        let rows = picture.pixels.chunks_exact(picture.width.max(1)).skip(self.y).take(self.height);
+        let pixels = rows.flat_map(|row| &row[self.x..self.x + self.width]).copied().collect();
+        Picture::new(self.width, self.height, pixels)
+    }
+}
+
+impl std::fmt::Display for Rectangle {
+    /// As `--inset` takes it.
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(formatter, "{},{},{},{}", self.x, self.y, self.width, self.height)
+    }
+}
+
 /// A picture to flip to.
 #[derive(Clone, Debug)]
 pub struct Layer<'a> {
