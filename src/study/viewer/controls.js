@@ -176,12 +176,22 @@ function updateReadout(viewer) {
   };
   const row = (name, values) => element("tr", {}, element("th", { scope: "row" }, name), ...values.map(value => element("td", {}, value)));
   const rows = [row(layer.name, rgb(layer))];
-  if (reference && layer !== reference) rows.push(row("Reference", rgb(reference)));
-  if (reference && layer === reference) rows.push(row("\u00a0", ["", "", ""]));
+  const comparable = viewer.comparable(layer) && viewer.ready;
+  if (reference) rows.push(layer === reference ? row("\u00a0", ["", "", ""]) : row("Reference", rgb(reference)));
+  if (reference) rows.push(comparable ? row("Difference", differences(viewer, layer, x, y)) : row("\u00a0", ["", "", ""]));
+  const error = comparable && viewer.mode !== "image" ? ` · ${MODE_NAMES[viewer.mode].toLowerCase()} ${digits(viewer.map(layer, viewer.mode)[y * viewer.width + x])}` : "";
   controls.readout.replaceChildren(element("table", {},
-    element("caption", {}, `Pixel ${x}, ${y}${viewer.hover ? "" : " (centre)"} · half precision · zoom ${digits(Number(viewer.zoom.toFixed(2)))}`),
+    element("caption", {}, `Pixel ${x}, ${y}${viewer.hover ? "" : " (centre)"} · half precision · zoom ${digits(Number(viewer.zoom.toFixed(2)))}${error}`),
     element("thead", {}, element("tr", {}, ...["", "R", "G", "B"].map(name => element("th", { scope: "col" }, name)))),
     element("tbody", {}, ...rows)));
+}
+
+/** Picture less reference, by channel; nothing where either has no usable number. */
+function differences(viewer, layer, x, y) {
+  const at = 3 * (y * viewer.width + x);
+  const codes = [layer.codes, viewer.reference.codes];
+  if (codes.some(of => kindAt(of, at))) return ["–", "–", "–"];
+  return [0, 1, 2].map(c => digits((VALUES[codes[0][at + c]] - VALUES[codes[1][at + c]]) * viewer.unit));
 }
 
 /** Makes the elements of all crops. */

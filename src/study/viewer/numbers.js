@@ -131,9 +131,10 @@ const MAPS = {
   },
 };
 
-/** 256 opaque pixels from a map's lowest to its highest value. */
+/** Opaque pixels from a map's lowest to its highest value, 256 to a side, so that no error is one of them. */
 function colourTable(map) {
-  return Uint32Array.from({ length: 256 }, (_, i) => opaque(...map.colour(map.low + ((1 - map.low) * i) / 255)));
+  const last = 255 * (1 - map.low);
+  return Uint32Array.from({ length: last + 1 }, (_, i) => opaque(...map.colour(map.low + i / 255)));
 }
 
 /** Kind of the worst component of the pixel whose red code is at `at`. */
@@ -231,6 +232,6 @@ function digits(value) {
   if (!Number.isFinite(value)) return value > 0 ? "inf" : "−inf";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  const text = size >= 1e-3 && size < 1e5 ? String(Number(value.toPrecision(4))) : value.toExponential(2).replace("e+", "e");
+  const text = size >= 1e-3 && size < 1e5 ? String(Number(value.toPrecision(4))) : value.toExponential(3).replace("e+", "e");
   return text.replace(/-/g, "−");
 }

@@ -138,8 +138,8 @@ class Viewer {
     const bytes = plain ? this.encoding() : null;
     const map = plain ? null : this.map(layer, this.mode);
     const colours = plain ? null : this.colours();
-    const { low } = plain ? { low: 0 } : MAPS[this.mode];
-    const factor = plain ? 0 : 255 / (1 - low) / this.range();
+    const factor = plain ? 0 : 255 / this.range();
+    const zero = plain ? 0 : -255 * MAPS[this.mode].low;
     for (let row = 0, to = 0; row < height; row++) {
       for (let column = 0, from = (y + row) * layer.width + x; column < width; column++, from++, to++) {
         const at = 3 * from;
@@ -147,7 +147,7 @@ class Viewer {
         if (kind) pixels[to] = marks[kind];
         else if (plain) pixels[to] = opaque(bytes[layer.codes[at]], bytes[layer.codes[at + 1]], bytes[layer.codes[at + 2]]);
         else if (Number.isNaN(map[from])) pixels[to] = marks[kindAt(this.reference.codes, at)];
-        else pixels[to] = colours[Math.max(0, Math.min(255, Math.round(map[from] * factor + (low < 0 ? 127.5 : 0))))];
+        else pixels[to] = colours[Math.max(0, Math.min(colours.length - 1, zero + Math.round(map[from] * factor)))];
       }
     }
     return image;
