@@ -5,7 +5,6 @@ import pathlib
 import shutil
 import statistics
 import sys
-import time
 
 from playwright.sync_api import sync_playwright
 
@@ -44,6 +43,14 @@ COLOURS = """() => {
 CHARTS = """() => [...document.querySelectorAll("svg[role=img]")].map(svg =>
   ({ name: svg.querySelector("title")?.textContent ?? "", series: [...svg.querySelectorAll("[data-series]")].map(e => e.dataset.series) }))"""
 
+# Seconds until the page is loaded and every viewer in the window is unpacked.
+OPENED = """async () => {
+  const inWindow = e => { const b = e.getBoundingClientRect(); return b.top < innerHeight && b.bottom > 0; };
+  const pending = () => [...document.querySelectorAll("section.viewer")].some(s => inWindow(s) && !["ready", "failed"].includes(s.dataset.state));
+  while (document.readyState !== "complete" || pending()) await new Promise(done => setTimeout(done, 5));
+  return performance.now() / 1000;
+}"""
+
 FOCUS = """section => { const stage = section.querySelector(".viewer-stage"); stage.focus();
   const style = getComputedStyle(stage); return style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2; }"""
 
@@ -78,9 +85,7 @@ class Page:
         self.page.on("pageerror", lambda e: self.told.append(f"exception: {e}"))
         self.page.on("websocket", lambda w: self.asked.append(w.url))
         self.page.on("request", lambda r: self.note(r.url))
-        before = time.perf_counter()
         self.page.goto(self.url, wait_until="load")
-        self.seconds = time.perf_counter() - before
 
     def note(self, url):
         if url.split("#")[0] != self.url and not url.startswith(("data:", "blob:")) and url not in self.asked:
@@ -216,15 +221,15 @@ def check_page(browser, path, records, screenshots):
 
 
 def check_speed(browser, path):
-    """From opening the page to its first viewer unpacked, or to the end of loading; the median of five."""
+    """By the page's own clock, from the start of its loading to its end and to the viewers in the window unpacked; the median of five."""
     check = Check(path.name)
     times = []
     for _ in range(5):
-        before = time.perf_counter()
         with Page(browser, path, **DESKTOP) as page:
-            times.append(time.perf_counter() - before)
+            times.append(page.page.evaluate(OPENED))
             check("the console is silent while loading", not page.told, page.told[:5])
-    check(f"opens in {statistics.median(times):.2f} s, {path.stat().st_size / 1e6:.1f} MB", statistics.median(times) < LOAD_LIMIT, times)
+    median = statistics.median(times)
+    check(f"opens in {median:.2f} s ({min(times):.2f} to {max(times):.2f}), {path.stat().st_size / 1e6:.1f} MB", median < LOAD_LIMIT, times)
     return check.failed
 
 

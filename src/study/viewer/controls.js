@@ -213,7 +213,7 @@ function cropElement(viewer, crop, index) {
   const cells = viewer.layers.map((layer, at) => {
     const canvas = element("canvas", { width: crop.width, height: crop.height, style: `aspect-ratio:${crop.width}/${crop.height}` });
     return element("button", { type: "button", class: "viewer-crop-cell", "data-layer": at, "aria-pressed": "false", onclick: () => viewer.flip(at) },
-      canvas, element("span", { class: "viewer-crop-name" }, layer.name), element("span", { class: "viewer-crop-number" }));
+      canvas, element("span", { class: "viewer-crop-name" }, `${at + 1} ${layer.name}`), element("span", { class: "viewer-crop-number" }));
   });
   crop.element = element("figure", { class: "viewer-crop" },
     element("figcaption", {}, element("b", {}, String(index + 1)), element("span", {}, place),

@@ -1,7 +1,7 @@
 //! Pictures side by side in a page: flip between methods and reference, look into pixels, see where the error is.
 //!
 //! What comes out is HTML that needs nothing but itself: the pictures are inside, as half floats, and a script without dependencies
-//! unpacks a section when it comes into view. The page [viewer](../../../../docs/viewer.md) of the manual tells keys, modes and numbers.
+//! unpacks a section when it comes into view. `docs/viewer.md` tells keys, modes and numbers.
 
 mod packing;
 
@@ -167,4 +167,70 @@ fn stops_into_half_range(picture: &Picture) -> i32 {
     // Beyond f32's range a factor of f32 would be infinite.
     let to_grey = Exposure::FromImage.scale(picture).log2().clamp(-140.0, 140.0);
     if to_grey.abs() <= NEAR { 0 } else { to_grey.round() as i32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rgb;
+
+    fn picture(value: f32) -> Picture {
+        Picture::new(4, 2, vec![Rgb::splat(value); 8])
+    }
+
+    fn header(html: &str) -> serde_json::Value {
+        let start = html.split_once("data-viewer=\"header\">").expect("a header").1;
+        serde_json::from_str(start.split_once("</script>").expect("its end").0).expect("JSON")
+    }
+
+    #[test]
+    fn names_do_not_become_elements() {
+        let nasty = "</script><b>&'\"";
+        let pixels = picture(0.18);
+        let layer = Layer { name: nasty.to_string(), picture: &pixels, caption: vec![(nasty.to_string(), nasty.to_string())] };
+        let view = View { id: "a".to_string(), title: nasty.to_string(), reference: None, layers: vec![layer], insets: Vec::new() };
+        let html = page(nasty, &[view], "<p>below</p>");
+        assert!(!html.contains(nasty) && !html.contains("<b>"), "{html}");
+        assert_eq!(header(&html)["layers"][0]["name"], nasty);
+        assert_eq!(header(&html)["layers"][0]["caption"][0][1], nasty);
+        assert!(html.contains("<p>below</p>"));
+        // The script and the style must not end their own elements.
+        assert!(!SCRIPT.contains("</script") && !STYLE.contains("</style") && !PAGE_STYLE.contains("</style"));
+    }
+
+    #[test]
+    fn a_section_holds_reference_layers_and_insets() {
+        let (reference, image) = (picture(0.18), picture(0.36));
+        let layer = Layer { name: "a".to_string(), picture: &image, caption: vec![("relmse".to_string(), "0.5".to_string())] };
+        let insets = vec![Rectangle { x: 1, y: 0, width: 2, height: 1 }];
+        let view = View { id: "s".to_string(), title: "t".to_string(), reference: Some(&reference), layers: vec![layer], insets };
+        let html = fragment_at(&view, 0.5);
+        let header = header(&html);
+        assert_eq!(html.matches("data-viewer=\"picture\"").count(), 2);
+        let marks: Vec<_> = header["layers"].as_array().expect("layers").iter().map(|l| l["reference"].as_bool()).collect();
+        assert_eq!(marks, [Some(true), Some(false)]);
+        assert_eq!(header["insets"], json!([[1, 0, 2, 1]]));
+        assert_eq!((header["stops"].as_i64(), header["epsilon"].as_f64()), (Some(0), Some(0.5)));
+        assert!(header["exposure"].as_f64().expect("a number").abs() < 1e-5, "{header}");
+    }
+
+    #[test]
+    fn a_crop_is_the_part_it_names() {
+        let numbered = Picture::new(4, 3, (0..12).map(|i| Rgb::splat(i as f32)).collect());
+        let crop = Rectangle { x: 1, y: 1, width: 2, height: 2 }.crop(&numbered);
+        assert_eq!(crop, Picture::new(2, 2, [5.0, 6.0, 9.0, 10.0].map(Rgb::splat).to_vec()));
+        assert_eq!(Rectangle { x: 1, y: 2, width: 3, height: 4 }.to_string(), "1,2,3,4");
+    }
+
+    #[test]
+    fn pictures_far_from_one_are_moved_into_range() {
+        for (value, stops) in
+            [(0.18, 0), (20.0, 0), (1e-3, 0), (0.18 * 2.0_f32.powi(20), -20), (0.18 * 2.0_f32.powi(-20), 20), (1e-40, 130)]
+        {
+            assert_eq!(stops_into_half_range(&picture(value)), stops, "{value}");
+        }
+        assert_eq!(stops_into_half_range(&picture(0.0)), 0);
+        assert!((-140..=140).contains(&stops_into_half_range(&picture(f32::MAX))));
+        assert!((-140..=140).contains(&stops_into_half_range(&picture(f32::from_bits(1)))));
+    }
 }
