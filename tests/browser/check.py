@@ -51,6 +51,10 @@ OPENED = """async () => {
   return performance.now() / 1000;
 }"""
 
+# Viewers far below the window that were unpacked all the same.
+EAGER = """() => [...document.querySelectorAll("section.viewer")].filter(s =>
+  s.getBoundingClientRect().top > innerHeight + 600 && s.dataset.state !== "waiting").map(s => s.id)"""
+
 FOCUS = """section => { const stage = section.querySelector(".viewer-stage"); stage.focus();
   const style = getComputedStyle(stage); return style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2; }"""
 
@@ -227,6 +231,8 @@ def check_speed(browser, path):
     for _ in range(5):
         with Page(browser, path, **DESKTOP) as page:
             times.append(page.page.evaluate(OPENED))
+            eager = page.page.evaluate(EAGER)
+            check("viewers out of sight wait", not eager, eager)
             check("the console is silent while loading", not page.told, page.told[:5])
     median = statistics.median(times)
     check(f"opens in {median:.2f} s ({min(times):.2f} to {max(times):.2f}), {path.stat().st_size / 1e6:.1f} MB", median < LOAD_LIMIT, times)

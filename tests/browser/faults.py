@@ -82,6 +82,14 @@ def main():
             good = not failed if expected is None else any(expected in what for what in failed)
             print(f"{'seen  ' if good else 'MISSED'} {expected or 'nothing wrong'}: {failed}", flush=True)
             missed += [] if good else [expected]
+        section = sound[sound.index("<section class=\"viewer\"") : sound.index("</section>") + len("</section>")]
+        several = sound.replace(section, "".join(section.replace("pictures", f"scene{i}") for i in range(4)))
+        for change, eager in [(lambda html: html, False), (replaced('rootMargin: "300px"', 'rootMargin: "99999px"'), True)]:
+            page.write_text(change(several))
+            failed, _ = failures(lambda: check.check_speed(browser, page))
+            good = ("viewers out of sight wait" in failed) == eager
+            print(f"{'seen  ' if good else 'MISSED'} viewers out of sight {'unpacked' if eager else 'wait'}: {failed}")
+            missed += [] if good else ["eager"]
         page.write_text(added("<script>{ const end = performance.now() + 2100; while (performance.now() < end); }</script>")(sound))
         failed, _ = failures(lambda: check.check_speed(browser, page))
         print(f"{'seen  ' if failed else 'MISSED'} slow: {failed}")

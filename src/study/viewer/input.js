@@ -177,7 +177,10 @@ function start() {
   }, { rootMargin: "300px" });
   viewers.forEach(viewer => near.observe(viewer.section));
   document.addEventListener("keydown", event => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select, textarea, [contenteditable]")) return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const field = event.target.closest?.("input, select, textarea, [contenteditable]");
+    // A slider needs the arrows only.
+    if (field && (field.type !== "range" || event.key.startsWith("Arrow"))) return;
     const viewer = addressed(viewers);
     if (viewer && act(viewer, event)) event.preventDefault();
   });
