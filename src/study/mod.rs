@@ -7,3 +7,4 @@ pub mod plan;
 pub mod records;
 pub mod references;
 pub mod run;
+pub mod viewer;

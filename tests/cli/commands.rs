@@ -87,6 +87,27 @@ fn compare_takes_images_as_runs() {
 }
 
 #[test]
+fn compare_measures_crops_and_writes_a_page() {
+    let bench = Bench::new();
+    let reference = vec![Rgb::splat(1.0), Rgb::splat(2.0), Rgb::splat(3.0), Rgb::splat(4.0)];
+    bench.write("r.exr", 2, reference.clone());
+    bench.write("x.exr", 2, vec![reference[0], Rgb::splat(2.5), reference[2], Rgb::splat(7.0)]);
+    let crops = ["--inset", "1,0,1,1", "--inset", "0,1,2,1"];
+    let document = bench.json(&[&["compare", "r.exr", "x.exr", "--json", "--html", "page.html"], &crops[..]].concat());
+    let insets = document["images"][0]["insets"].as_array().unwrap();
+    let mse: Vec<f64> = insets.iter().map(|inset| inset["mse"].as_f64().unwrap()).collect();
+    assert_eq!(mse, [0.25, 4.5]);
+    assert_eq!((insets[1]["x"].as_u64(), insets[1]["y"].as_u64(), insets[1]["pixels"].as_u64()), (Some(0), Some(1), Some(2)));
+    let table = bench.succeed(&[&["compare", "r.exr", "x.exr"], &crops[..]].concat());
+    assert!(table.contains("  1,0,1,1  ") && table.contains("  0,1,2,1  "), "{table}");
+    let page = std::fs::read_to_string(bench.path("page.html")).unwrap();
+    assert!(page.contains("crop 0,1,2,1") && page.contains("4.5000") && page.ends_with("</html>\n"), "{page}");
+    assert!(METRICS.iter().all(|m| page.contains(&format!("<th scope=\"col\">{}</th>", m.name))));
+    // Nothing to fetch: no address but those of namespaces.
+    assert!(!page.replace("http://www.w3.org/", "").contains("http"), "{page}");
+}
+
+#[test]
 fn info_tells_what_is_in_a_scene_and_in_an_image() {
     let bench = Bench::new();
     let scene = bench.json(&["info", "lamp/scene.xml", "--resolution", "20x10", "--json"]);

@@ -36,6 +36,8 @@ fn usage_that_is_wrong_is_told() {
         (&["render", method, "lamp/scene.xml", "--snapshots", "often"], "pow2"),
         (&["render", method, "lamp/scene.xml", "--aov", "depth"], "variance"),
         (&["compare", "a.exr"], "IMAGE"),
+        (&["compare", "a.exr", "b.exr", "--inset", "1,2,3"], "LEFT,TOP,WIDTH,HEIGHT"),
+        (&["compare", "a.exr", "--html", "b.exr", "c.exr"], "b.exr"),
         (&["list", "colours"], "methods"),
     ];
     for (arguments, expected) in mistakes {
@@ -65,6 +67,10 @@ fn input_that_is_bad_is_told_with_its_name() {
         (&["render", method, "lamp/scene.xml", "--crop", "10,10,20,20"], &["crop"]),
         (&["compare", "small.exr", "large.exr"], &["large.exr", "3x3", "2x2"]),
         (&["compare", "missing.exr", "small.exr"], &["missing.exr"]),
+        (&["compare", "small.exr", "small.exr", "--inset", "1,0,2,1"], &["--inset 1,0,2,1", "2x2"]),
+        (&["compare", "small.exr", "small.exr", "--html", "small.exr"], &["small.exr", ".html"]),
+        // The page is refused before the images are read.
+        (&["compare", "missing.exr", "small.exr", "--html", "nowhere/a.html"], &["nowhere"]),
         (&["info", "missing.exr"], &["missing.exr"]),
         (&["info", "text.exr"], &["text.exr", "not a readable EXR"]),
     ];
