@@ -9,6 +9,7 @@ mod options;
 mod output;
 pub mod processor;
 mod render;
+mod report;
 mod scene;
 mod signals;
 
@@ -67,6 +68,7 @@ fn command(methods: &'static [Method]) -> Command {
         .args([verbose, quiet.help("Tell nothing but errors")])
         .subcommand(render::command(methods))
         .subcommand(compare::CompareArgs::augment_args(Command::new("compare")).about("Metrics of images against a reference"))
+        .subcommand(report::ReportArgs::augment_args(Command::new("report")).about("One self-contained HTML file from a study's records"))
         .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
         .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
@@ -76,6 +78,7 @@ fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosi
     match matches.subcommand() {
         Some(("render", matches)) => render::run(matches, methods, verbosity),
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
+        Some(("report", matches)) => report::run(&parsed(matches)?, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),
         Some(("list", matches)) => list::run(&parsed(matches)?, methods),
         Some(("completions", matches)) => completions(matches, methods),

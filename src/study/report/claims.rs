@@ -34,7 +34,7 @@ pub(super) struct Standing {
     pub(super) seeds: usize,
     pub(super) error: Estimate,
     /// Its error over the best one's, and whether it is larger than one; none for the best.
-    pub(super) against_best: Option<(Ratio, Verdict)>,
+    pub(super) against_best: Option<(Ratio, Option<Verdict>)>,
 }
 
 /// A row of the table of efficiency.
@@ -178,9 +178,9 @@ pub(super) fn power(metric: &str) -> Option<f64> {
     }
 }
 
-/// The last two decades of a curve, or what the study asks for.
-fn window(plan: &Value, last: f64) -> (f64, f64) {
-    let asked = |key: &str| plan.get("report").and_then(|r| r.get("slope")).and_then(|s| s.get(key)).and_then(Value::as_f64);
+/// The last two decades of a curve, or the window in iterations that the study asks for.
+fn window(plan: &Value, axis: Axis, last: f64) -> (f64, f64) {
+    let asked = |key: &str| plan.get("report")?.get("slope")?.get(key)?.as_f64().filter(|_| axis == Axis::Iterations);
     (asked("from").unwrap_or(last / 100.0), asked("to").unwrap_or(last))
 }
 
@@ -189,7 +189,7 @@ pub(super) fn slope(row: &MethodRuns, metric: &str, axis: Axis, plan: &Value) ->
     let curve = row.curve(metric, axis);
     let x: Vec<f64> = curve.iter().map(|p| p.x).collect();
     let y: Vec<Vec<f64>> = (0..row.runs.len()).map(|k| curve.iter().map(|p| p.losses[k]).collect()).collect();
-    let window = window(plan, *x.last()?);
+    let window = window(plan, axis, *x.last()?);
     let inside = |x: &&f64| **x >= window.0 * (1.0 - 1e-9) && **x <= window.1 * (1.0 + 1e-9);
     let (from, to) = (*x.iter().find(inside)?, *x.iter().rev().find(inside)?);
     Some((log_log_slope(&x, &y, (from, to), LEVEL, key(5000 + row.style))?, (from, to)))

@@ -1,6 +1,10 @@
 //! Intervals, slopes and ratios over independent runs.
 
+use crate::image::picture::Picture;
 use crate::samplers::{Key, Stream};
+use crate::study::records::Record;
+use maud::html;
+use std::path::{Path, PathBuf};
 
 /// From `low` to `high`, both included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,19 +98,101 @@ pub(super) fn paired_ratio(a: &[f64], b: &[f64], level: f64, key: Key) -> Option
     ratio.is_finite().then(|| Ratio { ratio, interval: bootstrap(a.len(), 1000, level, key, of), runs: a.len() })
 }
 
-/// Whether the ratio is at most `bound`.
-pub(super) fn at_most(ratio: &Ratio, bound: f64) -> Verdict {
-    match ratio.interval {
-        Some(i) if i.high <= bound => Verdict::Holds,
-        Some(i) if i.low > bound => Verdict::Refuted,
-        Some(i) if i.low > 0.0 => {
+/// Whether the ratio is at most `bound`; none without an interval.
+pub(super) fn at_most(ratio: &Ratio, bound: f64) -> Option<Verdict> {
+    let interval = ratio.interval?;
+    Some(match interval {
+        i if i.high <= bound => Verdict::Holds,
+        i if i.low > bound => Verdict::Refuted,
+        i => {
             // The interval's width in the logarithm falls with the root of the number of runs.
             let half = 0.5 * (i.high / i.low).ln();
-            let distance = (ratio.ratio / bound).ln().abs();
-            let needed = ratio.runs as f64 * (half / distance).powi(2);
-            let more = (needed - ratio.runs as f64).ceil();
-            Verdict::Undecided { more_runs: (more.is_finite() && more < 1e4).then_some(more.max(1.0) as usize) }
+            let distance = (bound / ratio.ratio).ln();
+            let more = (ratio.runs as f64 * ((half / distance).powi(2) - 1.0)).ceil();
+            let usable = distance > 0.0 && more.is_finite() && more < 1e6;
+            Verdict::Undecided { more_runs: usable.then_some(more.max(1.0) as usize) }
         }
-        _ => Verdict::Undecided { more_runs: None },
-    }
+    })
 }
+
+/// All records of a study's folder; a last line that was cut off is left out.
+pub(super) fn read(folder: &Path) -> Result<Vec<Record>, RecordsError> {
+    let path = folder.join("records.jsonl");
+    let bytes = std::fs::read(&path).map_err(|source| RecordsError::Io { path: path.clone(), source })?;
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    let parse = |(i, line): (usize, &[u8])| {
+        let refuse = |error: serde_json::Error| RecordsError::Line { path: path.clone(), line: i + 1, message: error.to_string() };
+        serde_json::from_slice(line).map_err(refuse)
+    };
+    bytes[..whole].split_inclusive(|byte| *byte == b'\n').enumerate().map(parse).collect()
+}
+
+/// The records of a study cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordsError {
+    /// The system refuses the file.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A line is no record of this version.
+    #[error("{}:{line}: {message}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        message: String,
+    },
+}
+
+/// Pixels, from the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Rectangle {
+    pub(super) x: usize,
+    pub(super) y: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// A picture to flip to.
+pub(super) struct Layer<'a> {
+    pub(super) name: String,
+    pub(super) picture: &'a Picture,
+    pub(super) caption: Vec<(String, String)>,
+}
+
+/// One scene's pictures.
+pub(super) struct View<'a> {
+    pub(super) id: String,
+    pub(super) title: String,
+    pub(super) reference: Option<&'a Picture>,
+    pub(super) layers: Vec<Layer<'a>>,
+    pub(super) insets: Vec<Rectangle>,
+}
+
+/// The pictures of a scene one after the other.
+pub(super) fn fragment(view: &View) -> String {
+    let mean = |p: &Picture| p.pixels.iter().map(|v| f64::from(v.luminance())).filter(|v| v.is_finite()).sum::<f64>() / p.pixels.len().max(1) as f64;
+    let reference = view.reference.map(|p| ("Reference".to_string(), p, Vec::new()));
+    let layers = view.layers.iter().map(|l| (l.name.clone(), l.picture, l.caption.clone()));
+    html! {
+        section.viewer id=(view.id) data-insets=(view.insets.len()) {
+            h2 { (view.title) }
+            @for (name, picture, caption) in reference.into_iter().chain(layers) {
+                p { (name) ": mean luminance " (super::numbers::plain(mean(picture))) @for (key, value) in caption { ", " (key) " " (value) } }
+            }
+        }
+    }
+    .into_string()
+}
+
+/// Script of the sections.
+pub(super) const SCRIPT: &str = "";
+
+/// Style of the sections.
+pub(super) const STYLE: &str = "";

@@ -1,6 +1,7 @@
 //! Pictures for the page: small ones to look at, crops pixel by pixel, maps in false colour.
 
 use super::ReportError;
+use super::interim::Rectangle;
 use crate::image::picture::Picture;
 use crate::image::tonemap::srgb;
 use crate::math::Rgb;
@@ -16,34 +17,27 @@ const MAP: usize = 256;
 /// Steps of colour in a map.
 const STEPS: f32 = 32.0;
 
-/// A window of a picture, pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Window {
-    pub(super) x: usize,
-    pub(super) y: usize,
-    pub(super) width: usize,
-    pub(super) height: usize,
-}
-
-impl Window {
+/// What a page asks of a window.
+impl Rectangle {
     /// Whether it lies inside a picture.
     pub(super) fn fits(&self, (width, height): (usize, usize)) -> bool {
-        self.width > 0 && self.height > 0 && self.x + self.width <= width && self.y + self.height <= height
+        let ends = self.x.checked_add(self.width).zip(self.y.checked_add(self.height));
+        self.width > 0 && self.height > 0 && ends.is_some_and(|(x, y)| x <= width && y <= height)
     }
 
-    fn meets(&self, other: &Window) -> bool {
+    fn meets(&self, other: &Rectangle) -> bool {
         self.x < other.x + other.width && other.x < self.x + self.width && self.y < other.y + other.height && other.y < self.y + self.height
     }
 
     /// Indices of its pixels, row by row.
     fn pixels(&self, width: usize) -> impl Iterator<Item = usize> + use<> {
-        let Window { x, y, width: w, height: h } = *self;
+        let Rectangle { x, y, width: w, height: h } = *self;
         (y..y + h).flat_map(move |row| (x..x + w).map(move |column| row * width + column))
     }
 }
 
 /// The part of a picture inside a window that fits.
-pub(super) fn crop(picture: &Picture, window: &Window) -> Picture {
+pub(super) fn crop(picture: &Picture, window: &Rectangle) -> Picture {
     Picture::new(window.width, window.height, window.pixels(picture.width).map(|i| picture.pixels[i]).collect())
 }
 
@@ -52,7 +46,7 @@ pub(super) fn shrink(picture: &Picture, factor: usize) -> Picture {
     let (width, height) = (picture.width.div_ceil(factor), picture.height.div_ceil(factor));
     let mean = |i: usize| {
         let (x, y) = (i % width * factor, i / width * factor);
-        let window = Window { x, y, width: factor.min(picture.width - x), height: factor.min(picture.height - y) };
+        let window = Rectangle { x, y, width: factor.min(picture.width - x), height: factor.min(picture.height - y) };
         let sum: Rgb = window.pixels(picture.width).map(|p| picture.pixels[p]).sum();
         sum / (window.width * window.height) as f32
     };
@@ -122,21 +116,21 @@ pub(super) fn scale_bar() -> Result<String, ReportError> {
 }
 
 /// The two windows, a fifth of the picture wide, where a map is largest on average, the second apart from the first.
-pub(super) fn worst_windows(map: &[f32], (width, height): (usize, usize)) -> Vec<Window> {
+pub(super) fn worst_windows(map: &[f32], (width, height): (usize, usize)) -> Vec<Rectangle> {
     let side = (width.min(height) / 4).max(1);
     let step = (side / 2).max(1);
     let places = |extent: usize| (0..=extent.saturating_sub(side)).step_by(step);
-    let mut windows: Vec<(f64, Window)> = Vec::new();
+    let mut windows: Vec<(f64, Rectangle)> = Vec::new();
     for y in places(height) {
         for x in places(width) {
-            let window = Window { x, y, width: side, height: side };
+            let window = Rectangle { x, y, width: side, height: side };
             // A root damps fireflies, so that one pixel does not choose the window.
             let sum: f64 = window.pixels(width).map(|i| f64::from(map[i])).filter(|v| v.is_finite()).map(f64::sqrt).sum();
             windows.push((sum, window));
         }
     }
     windows.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut chosen: Vec<Window> = Vec::new();
+    let mut chosen: Vec<Rectangle> = Vec::new();
     for (_, window) in windows {
         if chosen.len() < 2 && chosen.iter().all(|c| !c.meets(&window)) {
             chosen.push(window);

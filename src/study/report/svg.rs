@@ -81,6 +81,7 @@ pub(super) fn dress(text: &str, chart: &Chart) -> Result<String, ReportError> {
         }
     }
     let style = |index: usize| chart.series.get(index).map_or(0, |s| s.style);
+    let label = |index: usize| chart.series.get(index).map_or("", |s| s.label.as_str());
     let (title, description) = (format!("{}-title", chart.id), format!("{}-desc", chart.id));
     let markup = html! {
         svg viewBox=(format!("0 0 {} {}", SIZE.0, SIZE.1)) role="img" aria-labelledby=(title) aria-describedby=(description)
@@ -90,8 +91,11 @@ pub(super) fn dress(text: &str, chart: &Chart) -> Result<String, ReportError> {
             @for piece in &pieces {
                 @match piece {
                     Piece::Plain(node, part, index) => {
-                        @let extra = if *part == Part::Band { format!(" {}", classes(style(*index))) } else { String::new() };
-                        (element(*node, &format!("{}{extra}", part.class()), None))
+                        @if *part == Part::Band {
+                            g class=(classes(style(*index))) data-band=(label(*index)) { (element(*node, part.class(), None)) }
+                        } @else {
+                            (element(*node, part.class(), None))
+                        }
                     }
                     Piece::Series(index, nodes) => (series(chart, *index, nodes)),
                 }
