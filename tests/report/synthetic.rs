@@ -14,45 +14,45 @@ use std::path::Path;
 
 /// A method whose every property is planted.
 #[derive(Clone, Debug)]
-pub struct FakeMethod {
-    pub label: String,
-    pub name: &'static str,
-    pub settings: Value,
+pub(crate) struct FakeMethod {
+    pub(crate) label: String,
+    pub(crate) name: &'static str,
+    pub(crate) settings: Value,
     /// Seconds of an iteration.
-    pub seconds: f64,
+    pub(crate) seconds: f64,
     /// Relative standard deviation of one iteration.
-    pub noise: f64,
+    pub(crate) noise: f64,
     /// Exponent of the standard deviation in iterations.
-    pub noise_slope: f64,
+    pub(crate) noise_slope: f64,
     /// Relative bias of one iteration, and its exponent.
-    pub bias: f64,
-    pub bias_slope: f64,
+    pub(crate) bias: f64,
+    pub(crate) bias_slope: f64,
     /// Light paths of an iteration.
-    pub photons: u64,
+    pub(crate) photons: u64,
 }
 
 /// A whole study.
 #[derive(Clone, Debug)]
-pub struct FakeStudy {
-    pub scenes: Vec<String>,
-    pub methods: Vec<FakeMethod>,
-    pub seeds: u64,
+pub(crate) struct FakeStudy {
+    pub(crate) scenes: Vec<String>,
+    pub(crate) methods: Vec<FakeMethod>,
+    pub(crate) seeds: u64,
     /// Render time of every cell.
-    pub time: f64,
-    pub size: (usize, usize),
+    pub(crate) time: f64,
+    pub(crate) size: (usize, usize),
     /// Whether scenes have references.
-    pub references: bool,
+    pub(crate) references: bool,
     /// Whether pictures along the way are kept.
-    pub keep: bool,
+    pub(crate) keep: bool,
 }
 
 impl FakeMethod {
-    pub fn path(label: &str, seconds: f64, noise: f64) -> Self {
+    pub(crate) fn path(label: &str, seconds: f64, noise: f64) -> Self {
         let settings = json!({"max_depth": 8});
         Self { label: label.into(), name: "path", settings, seconds, noise, noise_slope: -0.5, bias: 0.0, bias_slope: 0.0, photons: 0 }
     }
 
-    pub fn sppm(label: &str, seconds: f64, noise: f64, bias: f64, alpha: f64) -> Self {
+    pub(crate) fn sppm(label: &str, seconds: f64, noise: f64, bias: f64, alpha: f64) -> Self {
         Self {
             label: label.into(),
             name: "sppm",
@@ -69,7 +69,7 @@ impl FakeMethod {
 
 impl FakeStudy {
     /// Four scenes, six methods, five seeds.
-    pub fn large() -> Self {
+    pub(crate) fn large() -> Self {
         let methods = vec![
             FakeMethod::path("path", 0.02, 1.2),
             FakeMethod::sppm("sppm, 1 pixel", 0.09, 0.9, 0.02, 0.75),
@@ -83,7 +83,7 @@ impl FakeStudy {
     }
 
     /// Two scenes, three methods, small pictures.
-    pub fn small() -> Self {
+    pub(crate) fn small() -> Self {
         let methods = vec![
             FakeMethod::path("path", 0.02, 1.0),
             FakeMethod::sppm("sppm", 0.08, 0.5, 0.05, 0.75),
@@ -93,7 +93,7 @@ impl FakeStudy {
     }
 
     /// Writes records and pictures.
-    pub fn write(&self, folder: &Path) {
+    pub(crate) fn write(&self, folder: &Path) {
         let mut lines = vec![Record::Study(Box::new(self.start()))];
         for (index, scene) in self.scenes.iter().enumerate() {
             let truth = truth(index, self.size);
@@ -198,7 +198,6 @@ impl FakeStudy {
             radius: (method.photons > 0).then_some(0.01),
             seconds: end.seconds,
             cpu_seconds: end.cpu_seconds,
-            threads: 2,
             light_paths: end.light_paths,
             camera_paths: end.camera_paths,
             rays: end.rays,
@@ -247,14 +246,14 @@ fn measured(truth: &Picture, picture: &Picture) -> BTreeMap<String, Option<f64>>
 }
 
 /// Writes records as a study does.
-pub fn write_lines(folder: &Path, lines: &[Record]) {
+pub(crate) fn write_lines(folder: &Path, lines: &[Record]) {
     std::fs::create_dir_all(folder).expect("a folder");
     let text: String = lines.iter().map(|l| serde_json::to_string(l).expect("JSON") + "\n").collect();
     std::fs::write(folder.join("records.jsonl"), text).expect("written");
 }
 
 /// Reads them back, to change some.
-pub fn read_lines(folder: &Path) -> Vec<Record> {
+pub(crate) fn read_lines(folder: &Path) -> Vec<Record> {
     let text = std::fs::read_to_string(folder.join("records.jsonl")).expect("read");
     text.lines().map(|l| serde_json::from_str(l).expect("a record")).collect()
 }

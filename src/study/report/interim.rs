@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 /// From `low` to `high`, both included.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
+pub(super) struct Interval {
     /// Lower end.
-    pub low: f64,
+    pub(super) low: f64,
     /// Upper end.
-    pub high: f64,
+    pub(super) high: f64,
 }
 
 /// A straight line through logarithms.
