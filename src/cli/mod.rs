@@ -12,6 +12,7 @@ mod over_runs;
 pub mod processor;
 mod reference;
 mod render;
+mod report;
 mod scene;
 mod signals;
 mod study;
@@ -75,6 +76,7 @@ fn command(methods: &'static [Method]) -> Command {
         .subcommand(
             study::StudyArgs::augment_args(Command::new("study")).about("Renders scenes by methods by seeds, and goes on where it stopped"),
         )
+        .subcommand(report::ReportArgs::augment_args(Command::new("report")).about("One self-contained HTML file from a study's records"))
         .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
         .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
@@ -86,6 +88,7 @@ fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosi
         Some(("reference", matches)) => reference::run(matches, methods, verbosity),
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
         Some(("study", matches)) => study::run(&parsed(matches)?, methods, verbosity),
+        Some(("report", matches)) => report::run(&parsed(matches)?, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),
         Some(("list", matches)) => list::run(&parsed(matches)?, methods),
         Some(("completions", matches)) => completions(matches, methods),

@@ -6,5 +6,6 @@ pub mod machine;
 pub mod plan;
 pub mod records;
 pub mod references;
+pub mod report;
 pub mod run;
 pub mod viewer;
