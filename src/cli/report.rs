@@ -5,7 +5,7 @@ use super::failure::{Failure, Outcome};
 use super::output::bytes;
 use crate::study::report::{ReportError, Summary, write};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `report`.
@@ -19,17 +19,26 @@ pub(super) struct ReportArgs {
     output: Option<PathBuf>,
 }
 
+/// The page's name in a study's folder.
+pub(super) const REPORT: &str = "report.html";
+
 /// Runs it.
 pub(super) fn run(arguments: &ReportArgs, verbosity: Verbosity) -> Outcome {
-    let output = arguments.output.clone().unwrap_or_else(|| arguments.folder.join("report.html"));
-    let summary = write(&arguments.folder, &output)?;
+    let output = arguments.output.clone().unwrap_or_else(|| arguments.folder.join(REPORT));
+    let summary = write_page(&arguments.folder, &output)?;
     if verbosity != Verbosity::Quiet {
-        for problem in &summary.problems {
-            eprintln!("warning: {problem}");
-        }
         eprintln!("{}: {}", output.display(), told(&summary));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the page of a study's folder; what it could not show is a warning.
+pub(super) fn write_page(folder: &Path, output: &Path) -> Result<Summary, Failure> {
+    let summary = write(folder, output)?;
+    for problem in &summary.problems {
+        tracing::warn!("{problem}");
+    }
+    Ok(summary)
 }
 
 /// What the page holds, in one line.

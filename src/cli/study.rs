@@ -3,6 +3,7 @@
 use super::common::on_threads;
 use super::failure::{Failure, Outcome};
 use super::output::{print, print_json};
+use super::report::REPORT;
 use super::{Verbosity, signals};
 use crate::integrators::Method;
 use crate::render::{Interrupt, Step};
@@ -60,7 +61,7 @@ pub(super) fn run(arguments: &StudyArgs, methods: &'static [Method], verbosity: 
         };
         let start = Instant::now();
         let summary = study.run(&folder, &options, watch(verbosity).as_mut(), &interrupt)?;
-        let report = if summary.interrupted.is_none() { write_report(&folder)? } else { None };
+        let report = if summary.interrupted.is_none() { write_report(&folder, &summary)? } else { None };
         told(arguments, &study, &folder, &summary, report.as_deref(), start.elapsed(), verbosity)
     })
 }
@@ -71,9 +72,14 @@ fn default_folder(file: &Path) -> PathBuf {
     PathBuf::from(format!("{stem}.study"))
 }
 
-/// The page that shows the study; `None` while there is nothing that writes one.
-fn write_report(_folder: &Path) -> Result<Option<PathBuf>, Failure> {
-    Ok(None)
+/// Writes the page that shows the study, unless nothing is done that it could show.
+fn write_report(folder: &Path, summary: &Summary) -> Result<Option<PathBuf>, Failure> {
+    if summary.done == 0 {
+        return Ok(None);
+    }
+    let page = folder.join(REPORT);
+    super::report::write_page(folder, &page)?;
+    Ok(Some(page))
 }
 
 /// What a run would render.

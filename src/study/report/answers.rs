@@ -2,10 +2,10 @@
 
 use super::claims::{EqualTime, Standing};
 use super::data::{Scene, Study, loss_name};
-use super::interim::Verdict;
 use super::load::seeds_of;
 use super::numbers::{count, duration, with_interval};
 use super::tables::{level, ratio};
+use crate::math::statistics::Verdict;
 use maud::{Markup, html};
 
 /// What is asked.

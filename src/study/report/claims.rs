@@ -1,7 +1,7 @@
 //! Who wins: standings at equal time, speed-ups, the front of speed and accuracy, slopes beside theory.
 
 use super::data::{Axis, MethodRuns, Scene, loss_at_time, time_to_loss};
-use super::interim::{Interval, Ratio, Slope, Verdict, at_most, bootstrap, log_log_slope, median, paired_ratio};
+use crate::math::statistics::{Interval, Ratio, Slope, Verdict, at_most, bootstrap, log_log_slope, median, paired_ratio};
 use crate::samplers::{Key, Purpose};
 use serde_json::Value;
 
@@ -109,7 +109,7 @@ pub(super) fn equal_time(scene: &Scene, metric: &str) -> Option<EqualTime> {
 /// The same statement read the other way round.
 fn inverse(ratio: Ratio) -> Ratio {
     let interval = ratio.interval.filter(|i| i.low > 0.0).map(|i| Interval { low: 1.0 / i.high, high: 1.0 / i.low });
-    Ratio { ratio: 1.0 / ratio.ratio, interval, runs: ratio.runs }
+    Ratio { ratio: 1.0 / ratio.ratio, interval, ..ratio }
 }
 
 /// The table of efficiency; the first method is the baseline. Also the error that all methods reached, in the median.

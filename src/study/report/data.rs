@@ -128,7 +128,7 @@ impl MethodRuns {
 
     /// Median of a number of each run.
     pub(super) fn median(&self, of: impl Fn(&CellRecord) -> f64) -> f64 {
-        super::interim::median(&self.runs.iter().map(of).collect::<Vec<_>>()).unwrap_or(f64::NAN)
+        crate::math::statistics::median(&self.runs.iter().map(of).collect::<Vec<_>>()).unwrap_or(f64::NAN)
     }
 
     /// Loss of each run's last snapshot.
@@ -159,7 +159,8 @@ impl CurvePoint {
     /// None if a run has no usable number here, or the axis cannot show it on a logarithmic scale.
     fn of(snapshots: &[&SnapshotRecord], name: &str, axis: Axis) -> Option<Self> {
         let losses = snapshots.iter().map(|s| loss_at(s, name)).collect::<Option<Vec<f64>>>()?;
-        let median = |of: &dyn Fn(&SnapshotRecord) -> f64| super::interim::median(&snapshots.iter().map(|s| of(s)).collect::<Vec<_>>());
+        let median =
+            |of: &dyn Fn(&SnapshotRecord) -> f64| crate::math::statistics::median(&snapshots.iter().map(|s| of(s)).collect::<Vec<_>>());
         let x = median(&|s| axis.of(s)).filter(|x| x.is_finite() && *x > 0.0)?;
         Some(Self { x, iteration: median(&|s| s.iteration as f64)?, seconds: median(&|s| s.seconds)?, losses })
     }
@@ -168,7 +169,7 @@ impl CurvePoint {
     pub(super) fn spread(&self) -> (f64, f64, f64) {
         let low = self.losses.iter().copied().fold(f64::INFINITY, f64::min);
         let high = self.losses.iter().copied().fold(0.0, f64::max);
-        (super::interim::median(&self.losses).unwrap_or(f64::NAN), low, high)
+        (crate::math::statistics::median(&self.losses).unwrap_or(f64::NAN), low, high)
     }
 }
 

@@ -3,12 +3,12 @@
 use super::ReportError;
 use super::claims::EqualTime;
 use super::data::{Scene, Study, loss, loss_name};
-use super::interim::{Layer, Rectangle, View, fragment};
 use super::load::{ScenePictures, Shown};
 use super::numbers::{count, duration, or_dash, plain};
 use super::pictures::{crop, exact, false_colour, overview, scale_bar, worst_windows};
 use crate::image::picture::Picture;
 use crate::image::tonemap::Exposure;
+use crate::study::viewer::{Layer, Rectangle, View, fragment};
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 

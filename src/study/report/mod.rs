@@ -7,7 +7,6 @@ mod charts;
 mod claims;
 mod data;
 mod gallery;
-mod interim;
 mod load;
 mod numbers;
 mod page;
@@ -34,7 +33,7 @@ const VIEWER_PIXELS: usize = 2_000_000;
 pub enum ReportError {
     /// The records cannot be read.
     #[error(transparent)]
-    Records(#[from] interim::RecordsError),
+    Records(#[from] crate::study::records::RecordsError),
     /// There are no records.
     #[error("{}: no cell and no start of a study is on record", folder.display())]
     Empty {
@@ -73,7 +72,7 @@ pub struct Summary {
 
 /// Writes the page of the study in the folder `dir` to `out`, replacing it whole.
 pub fn write(dir: &Path, out: &Path) -> Result<Summary, ReportError> {
-    let study = Study::new(dir, interim::read(dir)?)?;
+    let study = Study::new(dir, crate::study::records::read(dir)?)?;
     crate::image::file::check_writable(out)?;
     let factor = viewer_factor(&study);
     let equals: Vec<_> = study.scenes.iter().map(|s| study.metric().and_then(|metric| claims::equal_time(s, metric))).collect();

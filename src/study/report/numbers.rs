@@ -1,6 +1,6 @@
 //! Numbers for people: no more digits than are known, and the interval beside the estimate.
 
-use super::interim::Interval;
+use crate::math::statistics::Interval;
 
 /// Digits of a number that comes without an interval.
 const DIGITS: i32 = 3;

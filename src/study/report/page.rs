@@ -3,7 +3,6 @@
 use super::answers::{overview, question};
 use super::claims::EqualTime;
 use super::data::{Scene, Study};
-use super::interim;
 use super::numbers::{count, duration};
 use super::tables::framed;
 use crate::image::metrics::{METRICS, Metric};
@@ -27,7 +26,7 @@ pub(super) fn page(study: &Study, equals: &[Option<EqualTime>], sections: &[Mark
                 meta name="generator" content=(concat!("isophote ", env!("CARGO_PKG_VERSION")));
                 link rel="icon" href="data:,";
                 title { (name) " – isophote" }
-                style { (PreEscaped(interim::STYLE)) (PreEscaped(STYLE)) }
+                style { (PreEscaped(crate::study::viewer::STYLE)) (PreEscaped(STYLE)) }
             }
             body {
                 a.skip href="#main" { "Skip to the results" }
@@ -58,7 +57,7 @@ pub(super) fn page(study: &Study, equals: &[Option<EqualTime>], sections: &[Mark
                     (again(study))
                     (reading(study))
                 }
-                script { (PreEscaped(interim::SCRIPT)) (PreEscaped(SCRIPT)) }
+                script { (PreEscaped(crate::study::viewer::SCRIPT)) (PreEscaped(SCRIPT)) }
             }
         }
     }

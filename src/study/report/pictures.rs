@@ -1,10 +1,10 @@
 //! Pictures for the page: small ones to look at, crops pixel by pixel, maps in false colour.
 
 use super::ReportError;
-use super::interim::Rectangle;
 use crate::image::picture::Picture;
 use crate::image::tonemap::srgb;
 use crate::math::Rgb;
+use crate::study::viewer::Rectangle;
 use base64::Engine;
 use image::codecs::{jpeg::JpegEncoder, png::PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};

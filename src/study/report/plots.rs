@@ -4,9 +4,9 @@ use super::ReportError;
 use super::charts::{Chart, Guide, Point, Series};
 use super::claims::{front, power, theory};
 use super::data::{Axis, CurvePoint, MethodRuns, Scene, Study, loss_name};
-use super::interim::median;
 use super::load::ScenePictures;
 use super::numbers::{count, duration, plain};
+use crate::math::statistics::median;
 use serde_json::Value;
 
 /// Error of every method over one axis, with the band over seeds.

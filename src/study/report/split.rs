@@ -4,8 +4,8 @@
 //! so the mean over i != j is the squared bias and the reference's own variance, and the mean over i = j adds the variance of a run.
 
 use super::claims::{Estimate, LEVEL};
-use super::interim::Interval;
 use crate::image::picture::Picture;
+use crate::math::statistics::Interval;
 use crate::math::statistics::student_quantile;
 
 /// Variance of one run and squared bias of a method, averaged over pixels and channels.

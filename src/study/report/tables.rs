@@ -2,11 +2,11 @@
 
 use super::claims::{Efficiency, EqualTime, Estimate, LEVEL, power, slope, theory};
 use super::data::{Axis, Scene, Study, loss_name};
-use super::interim::{Ratio, Verdict};
 use super::load::ScenePictures;
 use super::numbers::{count, duration, or_dash, plain, with_interval};
 use super::plots::exponent;
 use super::svg::swatch;
+use crate::math::statistics::{Ratio, Verdict};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -102,7 +102,7 @@ pub(super) fn efficiencies(rows: &[Efficiency], target: Option<f64>, metric: &st
 /// Fitted slopes beside theory.
 pub(super) fn slopes(study: &Study, scene: &Scene, metric: &str) -> Markup {
     let fitted = |row, axis| slope(row, metric, axis, study.plan());
-    let shown = |fit: &Option<(super::interim::Slope, (f64, f64))>| match fit {
+    let shown = |fit: &Option<(crate::math::statistics::Slope, (f64, f64))>| match fit {
         Some((s, _)) => with_interval(s.slope, s.interval),
         None => "–".to_string(),
     };
