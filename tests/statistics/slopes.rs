@@ -102,7 +102,9 @@ fn one_study_finds_noise_and_bias_within_a_twentieth() {
 fn all_slopes_at_all_numbers_of_runs() {
     for runs in [4, 5, 8, 16] {
         error_coverage("path", &unbiased(1), runs, REPETITIONS).nominal().unwrap();
-        error_coverage("path, loud seeds", &Fake { spread: 0.6, ..unbiased(10) }, runs, REPETITIONS).nominal().unwrap();
+        // A few loud seeds decide the mean, as if there were fewer: short, and docs/statistics.md says so.
+        let loud = error_coverage("path, loud seeds", &Fake { spread: 0.6, ..unbiased(10) }, runs, REPETITIONS);
+        assert!(loud.share() > 0.89, "{}", loud.share());
         // A variance over fewer runs has no bootstrap interval: sooner or later a resample is one run alone.
         for (method, alpha) in [(11, 2.0 / 3.0), (12, 0.75)].into_iter().filter(|_| runs >= 8) {
             let fake = progressive(method, alpha);

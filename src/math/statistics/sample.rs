@@ -94,8 +94,8 @@ impl Split {
     pub fn bias_interval(&self, level: f64) -> Option<Interval> {
         let of_the_runs = self.bias_variance - self.reference_variance;
         let freedom = (self.runs - 1) as f64 * (self.bias_variance / of_the_runs).powi(2);
-        // Runs that agree exactly leave only the reference's noise: the normal law, Student's with all the freedom there is.
-        let freedom = if freedom.is_finite() { freedom.min(1e9) } else { 1e9 };
+        // Runs that agree exactly leave only the reference's noise, and that is normal: 0 / 0 where that is nil too.
+        let freedom = if freedom.is_finite() { freedom } else { f64::MAX };
         let half = (level > 0.0 && level < 1.0).then(|| student_quantile(0.5 + 0.5 * level, freedom))? * self.bias_variance.sqrt();
         Interval::around(self.bias, half)
     }

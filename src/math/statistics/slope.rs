@@ -132,10 +132,10 @@ mod tests {
         }
         assert_eq!(fit(fine[..4].to_vec()), None);
         assert_eq!(log_log_slope(&x, &[], ALL, 0.95, KEY), None);
-        assert_eq!(log_log_slope(&x, &[fine.clone()], (1.0, 2.0), 0.95, KEY), None);
+        assert_eq!(log_log_slope(&x, std::slice::from_ref(&fine), (1.0, 2.0), 0.95, KEY), None);
         assert_eq!(log_log_slope(&[1.0, 1.0, 2.0], &[vec![1.0; 3]], ALL, 0.95, KEY), None);
         assert_eq!(log_log_slope(&[0.0, 1.0, 2.0, 4.0], &[vec![1.0; 4]], ALL, 0.95, KEY), None);
-        assert_eq!(log_log_slope(&x, &[fine.clone()], (f64::NAN, 8.0), 0.95, KEY), None);
+        assert_eq!(log_log_slope(&x, std::slice::from_ref(&fine), (f64::NAN, 8.0), 0.95, KEY), None);
     }
 
     /// The slope of a curve that some resamples bring below zero has an estimate and no interval.
