@@ -129,8 +129,8 @@ fn tiles_know_how_even_the_error_is() {
 fn sizes_must_agree() {
     let mut runs = runs_of(&[flat(1.0), flat(1.0)]);
     let wide = picture(2, 1, |_, _| 1.0);
-    assert_eq!(runs.add(&wide).err().expect("refused").to_string(), "is 2x1 pixels, the reference 1x1");
-    assert_eq!(runs.split(&wide, None).err().expect("refused").to_string(), "the runs' image is 1x1 pixels, the reference 2x1");
+    assert_eq!(runs.add(&wide).expect_err("refused").to_string(), "is 2x1 pixels, the reference 1x1");
+    assert_eq!(runs.split(&wide, None).expect_err("refused").to_string(), "the runs' image is 1x1 pixels, the reference 2x1");
     assert!(runs.relative_error_map(&wide, 0.01).is_err() && runs.tile_errors(&wide, 8, 0.01).is_err());
     assert_eq!(runs.count(), 2);
 }
