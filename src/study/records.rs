@@ -15,6 +15,7 @@ use std::path::PathBuf;
 pub const SCHEMA: u32 = 1;
 
 /// A line of `records.jsonl`.
+#[allow(clippy::large_enum_variant, reason = "there are few references, and lists of records are short")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Record {
