@@ -79,13 +79,14 @@ pub(super) fn plan_hash(plan: &Value) -> String {
     of_json(&json!([fixed, plan["seeds"], lists]))
 }
 
-/// Refuses a folder whose last plan is not part of this one.
+/// Refuses a folder whose last plan is not part of this one. Without a cell on record there is nothing to mix up.
 pub(super) fn check(folder: &Path, records: &[Record], plan: &Value) -> Result<(), StudyError> {
     let last = records.iter().rev().find_map(|record| match record {
         Record::Study(study) => Some(&study.plan),
         _ => None,
     });
-    match last.map(|before| difference(before, plan)) {
+    let begun = records.iter().any(|record| matches!(record, Record::Cell(_)));
+    match last.filter(|_| begun).map(|before| difference(before, plan)) {
         Some(Some(why)) => Err(StudyError::OtherStudy { folder: folder.to_path_buf(), why }),
         _ => Ok(()),
     }
