@@ -113,7 +113,7 @@ pub fn fragment_at(view: &View, epsilon: f64) -> String {
     let header = json!({
         "layers": described.collect::<Vec<_>>(),
         "insets": view.insets.iter().map(|r| [r.x, r.y, r.width, r.height]).collect::<Vec<_>>(),
-        "stops": stops, "epsilon": epsilon, "exposure": Exposure::FromImage.scale(first.picture).log2(),
+        "stops": stops, "epsilon": epsilon, "exposure": stops_to_grey(first.picture),
     });
     let (width, height) = first.picture.size();
     let mut html = format!(
@@ -161,11 +161,16 @@ pub fn escape(text: &str) -> String {
     html
 }
 
+/// The exposure that `--preview` takes from a picture, in stops.
+fn stops_to_grey(picture: &Picture) -> f32 {
+    // Beyond f32's range the factor is infinite.
+    Exposure::FromImage.scale(picture).log2().clamp(-140.0, 140.0)
+}
+
 /// Half floats span 2^-24 to 2^16: pictures whose typical luminance is far from 1 are moved there by a power of two, which costs no digit.
 fn stops_into_half_range(picture: &Picture) -> i32 {
     const NEAR: f32 = 8.0;
-    // Beyond f32's range a factor of f32 would be infinite.
-    let to_grey = Exposure::FromImage.scale(picture).log2().clamp(-140.0, 140.0);
+    let to_grey = stops_to_grey(picture);
     if to_grey.abs() <= NEAR { 0 } else { to_grey.round() as i32 }
 }
 
@@ -225,7 +230,7 @@ mod tests {
     #[test]
     fn pictures_far_from_one_are_moved_into_range() {
         for (value, stops) in
-            [(0.18, 0), (20.0, 0), (1e-3, 0), (0.18 * 2.0_f32.powi(20), -20), (0.18 * 2.0_f32.powi(-20), 20), (1e-40, 130)]
+            [(0.18, 0), (20.0, 0), (1e-3, 0), (0.18 * 2.0_f32.powi(20), -20), (0.18 * 2.0_f32.powi(-20), 20), (1e-36, 117), (1e-40, 140)]
         {
             assert_eq!(stops_into_half_range(&picture(value)), stops, "{value}");
         }

@@ -70,7 +70,7 @@ fn ascending(half: f16) -> u16 {
 
 /// Each value less what its left and upper neighbours let expect. Of noise the mean of two neighbours keeps less than either alone.
 fn residuals(plane: &[u16], width: usize) -> Vec<u16> {
-    let expected = |i: usize| match (i % width.max(1) > 0, i >= width) {
+    let expected = |i: usize| match (!i.is_multiple_of(width.max(1)), i >= width) {
         (true, true) => ((u32::from(plane[i - 1]) + u32::from(plane[i - width])) / 2) as u16,
         (true, false) => plane[i - 1],
         (false, true) => plane[i - width],
@@ -102,7 +102,7 @@ mod tests {
             let mut plane: Vec<u16> = Vec::new();
             for i in 0..count {
                 let residual = u16::from_le_bytes([bytes[2 * p * count + i], bytes[(2 * p + 1) * count + i]]);
-                let left = (i % width > 0).then(|| plane[i - 1]);
+                let left = (!i.is_multiple_of(width)).then(|| plane[i - 1]);
                 let above = (i >= width).then(|| plane[i - width]);
                 let expected = match (left, above) {
                     (Some(a), Some(b)) => a / 2 + b / 2 + (a & b & 1),
