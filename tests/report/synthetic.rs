@@ -5,9 +5,7 @@ use isophote::image::metrics::{EPSILON, METRICS, Pairs};
 use isophote::image::picture::Picture;
 use isophote::math::Rgb;
 use isophote::samplers::{Key, Purpose, Stream};
-use isophote::study::records::{
-    CellRecord, Machine, MadeReference, Record, ReferenceRecord, SCHEMA, SnapshotRecord, Status, StudyRecord,
-};
+use isophote::study::records::{CellRecord, Machine, MadeReference, Record, ReferenceRecord, SCHEMA, SnapshotRecord, Status, StudyRecord};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;

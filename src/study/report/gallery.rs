@@ -36,7 +36,8 @@ pub(super) fn insets(study: &Study, scene: &Scene, pictures: &ScenePictures) -> 
     if !mine.is_empty() {
         let windows: Vec<Option<Rectangle>> = mine.iter().map(|i| window(i, size)).collect();
         let outside = windows.iter().filter(|w| w.is_none()).count();
-        let note = (outside > 0).then(|| format!("{outside} of the study's insets do not lie inside {}x{} pixels and are left out.", size.0, size.1));
+        let note = (outside > 0)
+            .then(|| format!("{outside} of the study's insets do not lie inside {}x{} pixels and are left out.", size.0, size.1));
         return Insets { windows: windows.into_iter().flatten().collect(), note };
     }
     let mut sum = vec![0.0_f32; size.0 * size.1];
@@ -68,10 +69,8 @@ fn window(inset: &Value, (width, height): (usize, usize)) -> Option<Rectangle> {
 
 /// Label and value under a picture.
 fn caption(study: &Study, shown: &Shown, equal: Option<&EqualTime>) -> Vec<(String, String)> {
-    let mut lines = vec![
-        ("iterations".to_string(), count(shown.snapshot.iteration)),
-        ("render time".to_string(), duration(shown.snapshot.seconds)),
-    ];
+    let mut lines =
+        vec![("iterations".to_string(), count(shown.snapshot.iteration)), ("render time".to_string(), duration(shown.snapshot.seconds))];
     for metric in study.metrics.iter().take(2) {
         if let Some(value) = shown.snapshot.values.get(metric).copied().flatten() {
             lines.push((loss_name(metric), plain(loss(metric, value))));
@@ -153,16 +152,25 @@ fn card(
 }
 
 /// Flip between methods and reference, smaller by a factor where a page of full pictures would be too large.
-pub(super) fn viewer(study: &Study, scene: &Scene, index: usize, pictures: &ScenePictures, insets: &Insets, factor: usize) -> Option<Markup> {
+pub(super) fn viewer(
+    study: &Study,
+    scene: &Scene,
+    index: usize,
+    pictures: &ScenePictures,
+    insets: &Insets,
+    factor: usize,
+) -> Option<Markup> {
     let reference = pictures.reference.as_ref().map(|p| ScenePictures::shrunk(p, factor));
     let shown: Vec<_> = scene.rows.iter().zip(&pictures.methods).filter_map(|(row, m)| Some((row, m.shown.as_ref()?))).collect();
     let small: Vec<Picture> = shown.iter().map(|(_, s)| ScenePictures::shrunk(&s.picture, factor)).collect();
-    let layers = shown.iter().zip(&small).map(|((row, s), picture)| Layer {
-        name: row.label.clone(),
-        picture,
-        caption: caption(study, s, None),
-    });
-    let cut = |w: &Rectangle| Rectangle { x: w.x / factor, y: w.y / factor, width: (w.width / factor).max(1), height: (w.height / factor).max(1) };
+    let layers =
+        shown.iter().zip(&small).map(|((row, s), picture)| Layer { name: row.label.clone(), picture, caption: caption(study, s, None) });
+    let cut = |w: &Rectangle| Rectangle {
+        x: w.x / factor,
+        y: w.y / factor,
+        width: (w.width / factor).max(1),
+        height: (w.height / factor).max(1),
+    };
     let view = View {
         id: format!("viewer-{index}"),
         title: format!("{}: flip", scene.name),

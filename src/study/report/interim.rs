@@ -177,7 +177,9 @@ pub(super) struct View<'a> {
 
 /// The pictures of a scene one after the other.
 pub(super) fn fragment(view: &View) -> String {
-    let mean = |p: &Picture| p.pixels.iter().map(|v| f64::from(v.luminance())).filter(|v| v.is_finite()).sum::<f64>() / p.pixels.len().max(1) as f64;
+    let mean = |p: &Picture| {
+        p.pixels.iter().map(|v| f64::from(v.luminance())).filter(|v| v.is_finite()).sum::<f64>() / p.pixels.len().max(1) as f64
+    };
     let reference = view.reference.map(|p| ("Reference".to_string(), p, Vec::new()));
     let layers = view.layers.iter().map(|l| (l.name.clone(), l.picture, l.caption.clone()));
     html! {

@@ -150,6 +150,9 @@ mod tests {
             assert_eq!(plain(value), text);
         }
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
-        assert_eq!((tick(0.001), tick(1e-4), tick(2e-5), tick(100.0), tick(0.5)), ("0.001".into(), "10⁻⁴".into(), "2·10⁻⁵".into(), "100".into(), "0.5".into()));
+        assert_eq!(
+            (tick(0.001), tick(1e-4), tick(2e-5), tick(100.0), tick(0.5)),
+            ("0.001".into(), "10⁻⁴".into(), "2·10⁻⁵".into(), "100".into(), "0.5".into())
+        );
     }
 }

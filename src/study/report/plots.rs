@@ -153,8 +153,7 @@ pub(super) fn speed_accuracy(
             series.push(Series { label: row.label.clone(), style: row.style, points, line: cost == Cost::Total });
         }
     }
-    let all: Vec<(f64, f64, &str)> =
-        series.iter().flat_map(|s| s.points.iter().map(|p| (p.x, p.y, s.label.as_str()))).collect();
+    let all: Vec<(f64, f64, &str)> = series.iter().flat_map(|s| s.points.iter().map(|p| (p.x, p.y, s.label.as_str()))).collect();
     let best = front(&all.iter().map(|(x, y, _)| (*x, *y)).collect::<Vec<_>>());
     let corners: Vec<(f64, f64)> = best.iter().map(|&i| (all[i].0, all[i].1)).collect();
     let mut names: Vec<String> = Vec::new();

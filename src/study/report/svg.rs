@@ -51,9 +51,8 @@ impl Part {
 }
 
 /// Attributes that are kept.
-const KEPT: [&str; 17] = [
-    "x", "y", "dy", "text-anchor", "font-size", "transform", "points", "cx", "cy", "r", "x1", "y1", "x2", "y2", "width", "height", "fill",
-];
+const KEPT: [&str; 17] =
+    ["x", "y", "dy", "text-anchor", "font-size", "transform", "points", "cx", "cy", "r", "x1", "y1", "x2", "y2", "width", "height", "fill"];
 
 /// One element, or a run of elements of one series.
 enum Piece<'a, 'b> {

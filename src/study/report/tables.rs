@@ -111,7 +111,9 @@ pub(super) fn slopes(study: &Study, scene: &Scene, metric: &str) -> Markup {
         let window = iterations.as_ref().map_or("–".to_string(), |(_, w)| format!("{} – {}", count(w.0 as u64), count(w.1 as u64)));
         let expected = match (power(metric), theory(row.name(), row.settings())) {
             (Some(p), Some(t)) => match t.bias {
-                Some(bias) => format!("{} noise, {} bias", exponent(t.deviation * p), if bias == 0.0 { "0".into() } else { exponent(bias * p) }),
+                Some(bias) => {
+                    format!("{} noise, {} bias", exponent(t.deviation * p), if bias == 0.0 { "0".into() } else { exponent(bias * p) })
+                }
                 None => exponent(t.deviation * p),
             },
             _ => "–".to_string(),
@@ -131,7 +133,8 @@ pub(super) fn curves(scene: &Scene, metric: &str) -> Markup {
     for row in &scene.rows {
         for p in row.curve(metric, Axis::Iterations) {
             let (middle, low, high) = p.spread();
-            let paths = row.runs.iter().filter_map(|r| r.snapshots.iter().find(|s| s.iteration as f64 >= p.iteration)).map(|s| s.light_paths);
+            let paths =
+                row.runs.iter().filter_map(|r| r.snapshots.iter().find(|s| s.iteration as f64 >= p.iteration)).map(|s| s.light_paths);
             rows.push(vec![
                 name(&row.label, row.style),
                 text(count(p.iteration.round() as u64)),
@@ -193,8 +196,17 @@ pub(super) fn work(scene: &Scene) -> Markup {
         ]
     });
     let head = [
-        "method", "runs", "iterations", "seconds", "CPU seconds", "camera paths", "light paths", "rays", "million rays/s",
-        "samples rejected, all runs", "pixels masked, all runs",
+        "method",
+        "runs",
+        "iterations",
+        "seconds",
+        "CPU seconds",
+        "camera paths",
+        "light paths",
+        "rays",
+        "million rays/s",
+        "samples rejected, all runs",
+        "pixels masked, all runs",
     ];
     framed("Work of a run, medians over seeds", &head, rows.collect())
 }
