@@ -11,6 +11,7 @@ use plotters::element::{Circle, EmptyElement, PathElement, Polygon, Text};
 use plotters::prelude::{
     BindKeyPoints, Cartesian2d, ChartBuilder, ChartContext, DrawingArea, IntoDrawingArea, IntoFont, IntoLogRange, LogCoord, SVGBackend,
 };
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color, RGBColor};
 use std::ops::Range;
 
@@ -21,7 +22,7 @@ pub(super) const SIZE: (u32, u32) = (1920, 1320);
 const TEXT: i32 = 64;
 
 /// Room for the labels of the axes, units.
-const MARGIN: (u32, u32) = (270, 190);
+const MARGIN: (u32, u32) = (270, 160);
 
 /// Half the size of a marker, units.
 const MARKER: i32 = 17;
@@ -152,12 +153,18 @@ impl Chart {
         for (index, guide) in self.guides.iter().enumerate() {
             let Some(ends) = guide.inside(x, y) else { continue };
             chart.draw_series([PathElement::new(ends.to_vec(), Part::Guide.colour(index))]).map_err(failed)?;
-            let font = ("sans-serif", TEXT * 4 / 5).into_font().color(&Part::Guide.colour(index));
+            // To the left of its place, so that the edge does not cut it; a level's stands at the left edge.
+            let side = if guide.slope == 0.0 { HPos::Left } else { HPos::Right };
+            let font = ("sans-serif", TEXT * 4 / 5).into_font().color(&Part::Guide.colour(index)).pos(Pos::new(side, VPos::Bottom));
             // Labels of neighbouring guides stand at different places of their lines.
-            let t = if guide.slope == 0.0 { 0.02 } else { 0.9 - 0.13 * (index % 4) as f64 };
+            let t = if guide.slope == 0.0 { 0.02 } else { 1.0 - 0.11 * (index % 5) as f64 };
             let at = |a: f64, b: f64| (a.ln() * (1.0 - t) + b.ln() * t).exp();
             let place = (at(ends[0].0, ends[1].0), at(ends[0].1, ends[1].1));
-            chart.draw_series([EmptyElement::at(place) + Text::new(guide.label.clone(), (8, -60), font)]).map_err(failed)?;
+            chart
+                .draw_series(
+                    [EmptyElement::at(place) + Text::new(guide.label.clone(), (if guide.slope == 0.0 { 8 } else { -8 }, -6), font)],
+                )
+                .map_err(failed)?;
         }
         Ok(())
     }

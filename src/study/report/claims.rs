@@ -45,7 +45,7 @@ pub(super) struct Efficiency {
     pub(super) inefficiency: Estimate,
     /// How many times less of it than the baseline needs; none for the baseline.
     pub(super) speed_up: Option<Ratio>,
-    /// Seconds to the error that all methods reached.
+    /// Seconds to the error that every run reached.
     pub(super) seconds_to_target: Option<Estimate>,
     pub(super) target_speed_up: Option<Ratio>,
 }
@@ -95,14 +95,15 @@ pub(super) fn equal_time(scene: &Scene, metric: &str) -> Option<EqualTime> {
         }
     }
     there.sort_by(|a, b| a.3.value.total_cmp(&b.3.value));
-    let standing = |(i, (row, losses, seeds, error)): (usize, &(&MethodRuns, Vec<Option<f64>>, usize, Estimate))| {
+    let standing = |i: usize| {
+        let (row, losses, seeds, error) = &there[i];
         let (best_row, best_losses, ..) = &there[0];
         let (mine, best) = paired(row, losses, best_row, best_losses);
         let ratio = if i == 0 { None } else { paired_ratio(&best, &mine, LEVEL, key(1000 + row.style)) };
         let against_best = ratio.map(|ratio| (inverse(ratio), at_most(&ratio, 1.0)));
         Standing { label: row.label.clone(), style: row.style, seeds: *seeds, error: *error, against_best }
     };
-    let standings: Vec<Standing> = there.iter().enumerate().map(standing).collect();
+    let standings: Vec<Standing> = (0..there.len()).map(standing).collect();
     (!standings.is_empty()).then_some(EqualTime { seconds, standings, too_slow })
 }
 
@@ -112,14 +113,13 @@ fn inverse(ratio: Ratio) -> Ratio {
     Ratio { ratio: 1.0 / ratio.ratio, interval, ..ratio }
 }
 
-/// The table of efficiency; the first method is the baseline. Also the error that all methods reached, in the median.
+/// The table of efficiency; the first method is the baseline. Also the error that every run reached.
 pub(super) fn efficiency(scene: &Scene, metric: &str) -> (Vec<Efficiency>, Option<f64>) {
     let Some(baseline) = scene.rows.first() else { return (Vec::new(), None) };
     let work = |row: &MethodRuns| -> Vec<Option<f64>> {
         row.last_losses(metric).into_iter().zip(&row.runs).map(|(loss, run)| Some(loss? * run.snapshots.last()?.seconds)).collect()
     };
-    let reached = |row: &MethodRuns| median(&row.last_losses(metric).into_iter().flatten().collect::<Vec<_>>());
-    let target = scene.rows.iter().filter_map(reached).fold(None, |most: Option<f64>, v| Some(most.map_or(v, |m| m.max(v))));
+    let target = scene.rows.iter().flat_map(|row| row.last_losses(metric)).flatten().max_by(f64::total_cmp);
     let to_target = |row: &MethodRuns| -> Vec<Option<f64>> {
         row.runs.iter().map(|run| target.and_then(|target| time_to_loss(run, metric, target))).collect()
     };

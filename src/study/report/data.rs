@@ -146,10 +146,10 @@ impl MethodRuns {
             points.extend(same.and_then(|same| CurvePoint::of(&same, name, axis)));
         }
         let ends: Option<Vec<&SnapshotRecord>> = self.runs.iter().map(|r| r.snapshots.last()).collect();
-        if let Some(end) = ends.and_then(|ends| CurvePoint::of(&ends, name, axis)) {
-            if points.last().is_none_or(|last| last.iteration < end.iteration) {
-                points.push(end);
-            }
+        if let Some(end) = ends.and_then(|ends| CurvePoint::of(&ends, name, axis))
+            && points.last().is_none_or(|last| last.iteration < end.iteration)
+        {
+            points.push(end);
         }
         points
     }

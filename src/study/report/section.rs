@@ -91,7 +91,7 @@ impl Section<'_> {
             h3 { "Efficiency and speed-up" }
             p.note {
                 "Speed-ups are ratios of medians, paired by seed, with " (tables::level()) " intervals. The first takes error × time as constant, which holds for unbiased methods; "
-                "the second compares the times to the error that every method reached (" (super::numbers::or_dash(target)) ")."
+                "the second compares the times to the error that every run reached (" (super::numbers::or_dash(target)) ")."
             }
             (tables::efficiencies(&rows, target, default))
             span id=(format!("scene-{index}-end")) {}

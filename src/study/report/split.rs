@@ -62,21 +62,16 @@ impl Against<'_> {
                 for (difference, run) in differences.iter_mut().zip(self.runs) {
                     *difference = f64::from(run.pixels[i][c]) - r;
                 }
-                for a in 0..count {
-                    for b in 0..=a {
-                        gram[a][b] += weight * differences[a] * differences[b];
+                for (row, a) in gram.iter_mut().zip(&differences) {
+                    for (product, b) in row.iter_mut().zip(&differences) {
+                        *product += weight * a * b;
                     }
                 }
                 reference_variance += self.variance.map_or(0.0, |v| weight * f64::from(v.pixels[i][c]));
             }
         }
         let values = 3.0 * usable.len() as f64;
-        for a in 0..count {
-            for b in 0..=a {
-                gram[a][b] /= values;
-                gram[b][a] = gram[a][b];
-            }
-        }
+        gram.iter_mut().flatten().for_each(|product| *product /= values);
         Products { gram, reference_variance: reference_variance / values }
     }
 
