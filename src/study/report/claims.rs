@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_ratio_reads_both_ways() {
-        let ratio = inverse(Ratio { ratio: 0.5, interval: Some(Interval { low: 0.25, high: 0.8 }), runs: 5 });
+        let ratio = inverse(Ratio { ratio: 0.5, interval: Some(Interval { low: 0.25, high: 0.8 }), runs: 5, level: 0.95, spread: None });
         assert_eq!((ratio.ratio, ratio.interval), (2.0, Some(Interval { low: 1.25, high: 4.0 })));
     }
 }
