@@ -7,6 +7,7 @@
 use crate::image::exr::{self, read_file};
 use crate::image::file::replace;
 use crate::image::picture::{ImageError, Picture};
+use crate::image::runs::Runs;
 use crate::integrators::{BoxedSettings, Method};
 use crate::math::Rgb;
 use crate::render::{
@@ -70,6 +71,14 @@ impl Files {
         let about = std::fs::read(&self.about).ok()?;
         (self.mean.is_file() && self.var.is_file()).then(|| serde_json::from_slice(&about).ok())?
     }
+
+    /// Removes the runs of a complete reference, which a kill may have left. A folder that stays is only untidy.
+    pub fn tidy(&self) {
+        match std::fs::remove_dir_all(&self.runs) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => tracing::warn!("{}: {error}", self.runs.display()),
+            _ => (),
+        }
+    }
 }
 
 /// How a reference was made; `NAME.json`.
@@ -132,7 +141,8 @@ pub trait RunProgress: Progress {
 pub fn make(job: &Job, files: &Files, progress: &mut dyn RunProgress, interrupt: &Interrupt) -> Result<Option<About>, RenderError> {
     std::fs::create_dir_all(&files.runs).map_err(|error| ImageError::io(&files.runs, error))?;
     let settings = job.settings_json();
-    let (mut moments, mut metadatas) = (None, Vec::new());
+    let (width, height) = job.loaded.scene.camera().resolution();
+    let (mut together, mut metadatas) = (Runs::new(width, height), Vec::new());
     for (number, seed) in job.seeds().enumerate() {
         let path = files.runs.join(format!("{seed}.exr"));
         let (picture, metadata) = match kept(job, &settings, &path, seed) {
@@ -145,15 +155,11 @@ pub fn make(job: &Job, files: &Files, progress: &mut dyn RunProgress, interrupt:
                 }
             }
         };
-        moments.get_or_insert_with(|| Moments::new(picture.size())).add(&picture);
+        together.add(&picture).map_err(|size| ImageError::content(&path, size.to_string()))?;
         metadatas.push(metadata);
     }
-    let Some(moments) = moments else { return Ok(None) };
-    let about = write(job, files, settings, &moments, metadatas)?;
-    // The reference is complete; a folder that stays is only untidy.
-    if let Err(error) = std::fs::remove_dir_all(&files.runs) {
-        tracing::warn!("{}: {error}", files.runs.display());
-    }
+    let about = write(job, files, settings, &together, metadatas)?;
+    files.tidy();
     Ok(Some(about))
 }
 
@@ -199,8 +205,10 @@ fn run(
     Ok(Some((Picture::new(size.0, size.1, outcome.film.mean()), outcome.metadata)))
 }
 
-fn write(job: &Job, files: &Files, settings: Value, moments: &Moments, runs: Vec<Metadata>) -> Result<About, RenderError> {
-    let (mean, variance) = (moments.mean(), moments.variance_of_mean());
+fn write(job: &Job, files: &Files, settings: Value, together: &Runs, runs: Vec<Metadata>) -> Result<About, RenderError> {
+    // Of no run no mean is known, of one no variance; NaN says so.
+    let unknown = || Picture::new(together.size().0, together.size().1, vec![Rgb::splat(f32::NAN); together.size().0 * together.size().1]);
+    let (mean, variance) = (together.mean().unwrap_or_else(unknown), together.variance_of_mean().unwrap_or_else(unknown));
     let mut metadata = Metadata::new(job.scene.clone(), job.method.name, settings.clone());
     for run in &runs {
         metadata.radius = run.radius;
@@ -255,58 +263,9 @@ fn about(job: &Job, settings: Value, metadata: &Metadata, mean: &Picture, varian
     }
 }
 
-/// Mean and spread of pictures, updated picture by picture so that nothing is lost where the mean is large.
-struct Moments {
-    size: (usize, usize),
-    count: f64,
-    /// Mean and sum of squared deviations, by pixel and channel.
-    values: Vec<[(f64, f64); 3]>,
-}
-
-impl Moments {
-    fn new(size: (usize, usize)) -> Self {
-        Self { size, count: 0.0, values: vec![[(0.0, 0.0); 3]; size.0 * size.1] }
-    }
-
-    fn add(&mut self, picture: &Picture) {
-        self.count += 1.0;
-        for (moments, pixel) in self.values.iter_mut().zip(&picture.pixels) {
-            for (c, (mean, squares)) in moments.iter_mut().enumerate() {
-                let before = f64::from(pixel[c]) - *mean;
-                *mean += before / self.count;
-                *squares += before * (f64::from(pixel[c]) - *mean);
-            }
-        }
-    }
-
-    fn picture(&self, value: impl Fn((f64, f64)) -> f64) -> Picture {
-        let pixels = self.values.iter().map(|moments| Rgb::from(moments.map(|m| value(m) as f32))).collect();
-        Picture::new(self.size.0, self.size.1, pixels)
-    }
-
-    fn mean(&self) -> Picture {
-        self.picture(|(mean, _)| mean)
-    }
-
-    fn variance_of_mean(&self) -> Picture {
-        self.picture(|(_, squares)| squares / (self.count - 1.0) / self.count)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn mean_and_variance_by_hand() {
-        let mut moments = Moments::new((1, 1));
-        for x in [1.0, 2.0, 6.0] {
-            moments.add(&Picture::new(1, 1, vec![Rgb::new(x, 10.0 * x, 5.0)]));
-        }
-        // Variance of 1, 2, 6 is 7; of their mean, a third of it.
-        assert_eq!(moments.mean().pixels[0], Rgb::new(3.0, 30.0, 5.0));
-        assert_eq!(moments.variance_of_mean().pixels[0], Rgb::new(7.0 / 3.0, 700.0 / 3.0, 0.0));
-    }
 
     #[test]
     fn files_are_named_by_adding() {

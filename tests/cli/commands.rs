@@ -161,9 +161,13 @@ fn examples() -> Vec<serde_json::Value> {
 fn the_documented_examples_have_the_keys_that_are_printed() {
     let bench = Bench::new();
     let rendered = bench.json(&["render", "sppm", "lamp/scene.xml", "-o", "a.exr", "--json", "-q"]);
+    let study = "seeds = 2\nbudget = { iterations = 1 }\n[[scene]]\nfile = \"lamp/scene.xml\"\nreference = \"a.exr\"\n[[method]]\nname = \"path\"\n";
+    std::fs::write(bench.path("s.toml"), study).unwrap();
     let printed = [
         rendered,
         bench.json(&["compare", "a.exr", "a.exr", "--json"]),
+        bench.json(&["reference", "path", "lamp/scene.xml", "--runs", "2", "--iterations", "1", "-o", "ref", "--json", "-q"]),
+        bench.json(&["study", "s.toml", "--json", "-q"]),
         bench.json(&["info", "a.exr", "--json"]),
         bench.json(&["info", "lamp/scene.xml", "--json"]),
         bench.json(&["list", "--json"]),
@@ -180,6 +184,6 @@ fn the_documented_examples_have_the_keys_that_are_printed() {
         }
     }
     for part in ["defaults", "counts", "memory", "film", "bounds"] {
-        assert_eq!(keys(&examples[3][part]), keys(&printed[3][part]), "{part}");
+        assert_eq!(keys(&examples[5][part]), keys(&printed[5][part]), "{part}");
     }
 }

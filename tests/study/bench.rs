@@ -89,7 +89,7 @@ impl Bench {
 pub(crate) struct Essence {
     pub(crate) cells: Vec<CellRecord>,
     pub(crate) references: Vec<ReferenceRecord>,
-    /// Bits of the channels and metadata of every EXR, content of every other file but the records, by path.
+    /// Bits of the channels and metadata of every EXR, content of every other file but the records and the page, by path.
     pub(crate) files: BTreeMap<PathBuf, (Vec<u32>, Value)>,
 }
 
@@ -116,7 +116,8 @@ fn files(folder: &Path, root: &Path, found: &mut BTreeMap<PathBuf, (Vec<u32>, Va
                 (bits, without_times(file.metadata_json().unwrap().unwrap_or(Value::Null)))
             }
             Some("json") => (Vec::new(), without_times(serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap())),
-            Some("jsonl") => continue,
+            // The records are compared above, and the page tells times.
+            Some("jsonl" | "html") => continue,
             _ => (std::fs::read(&path).unwrap().into_iter().map(u32::from).collect(), Value::Null),
         };
         found.insert(name, content);

@@ -37,6 +37,7 @@ fn undisturbed(bench: &Bench) -> (Essence, Duration) {
     bench.succeed(&["study", "s.toml", "-o", "alone", "-q"]);
     let time = start.elapsed();
     let essence = bench.essence("alone");
+    assert!(bench.path("alone/report.html").is_file());
     assert_eq!((essence.cells.len(), essence.references.len()), (16, 2));
     // 16 final images, 3 films kept on the way to each, and two references of three files.
     assert_eq!(essence.files.len(), 16 * 4 + 2 * 3, "{:?}", essence.files.keys());

@@ -274,7 +274,8 @@ fn snapshots_are_measured_whether_kept_or_not() {
     for (snapshot, error) in measured.snapshots.iter().zip(&measured.metadata.errors) {
         assert_eq!((snapshot.iteration, snapshot.masked, error.values[MASKED].as_u64()), (error.iteration, 1, Some(1)));
         assert_eq!(snapshot.values.len() + 1, error.values.len());
-        assert!(snapshot.values.iter().all(|(key, value)| value.is_some() && error.values[key].as_f64() == *value));
+        // The picture is smaller than the window of ssim.
+        assert!(snapshot.values.iter().all(|(key, value)| value.is_some() != (key == "ssim") && error.values[key].as_f64() == *value));
     }
     assert_eq!(measured.snapshots.len(), 4);
 }

@@ -3,20 +3,23 @@
 use crate::study::error::StudyError;
 use std::path::Path;
 
-/// Removes files that a killed program was writing: they have temporary names until they are whole. Only where studies write; the folder itself
-/// may be one that others use.
+/// Removes files that a killed program was writing: they have temporary names until they are whole. Only where studies write: the folder
+/// itself, where the page goes, and the two for pictures.
 pub(super) fn clean(folder: &Path) -> Result<(), StudyError> {
     let parts = ["images", "references"].map(|part| folder.join(part));
-    parts.iter().filter(|part| part.is_dir()).try_for_each(|part| clean_all(part))
+    clean_folder(folder, false)?;
+    parts.iter().filter(|part| part.is_dir()).try_for_each(|part| clean_folder(part, true))
 }
 
-fn clean_all(folder: &Path) -> Result<(), StudyError> {
+fn clean_folder(folder: &Path, deep: bool) -> Result<(), StudyError> {
     for entry in std::fs::read_dir(folder).map_err(StudyError::io(folder))? {
         let entry = entry.map_err(StudyError::io(folder))?;
         let (path, kind) = (entry.path(), entry.file_type().map_err(StudyError::io(folder))?);
         let name = entry.file_name();
         if kind.is_dir() {
-            clean_all(&path)?;
+            if deep {
+                clean_folder(&path, deep)?;
+            }
         } else if kind.is_file() && name.to_str().is_some_and(|n| n.starts_with(".isophote-") && n.ends_with(".tmp")) {
             std::fs::remove_file(&path).map_err(StudyError::io(&path))?;
         }

@@ -202,6 +202,7 @@ impl Study {
     /// A reference made before, in the study's folder or in the cache.
     fn cached(&self, hash: &str, files: &Files) -> Result<Option<About>, StudyError> {
         if let Some(about) = files.complete() {
+            files.tidy();
             return Ok(Some(about));
         }
         let Some((shared, about)) = self.cache(hash).and_then(|shared| shared.complete().map(|about| (shared, about))) else {
