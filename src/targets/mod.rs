@@ -1,5 +1,10 @@
 //! What a photon sampler should aim at, and the space of light paths that joins scene and samplers.
 
+pub mod aim;
+pub mod aimed;
+pub mod deposits;
 pub mod light_paths;
+pub mod points;
+pub mod regions;
 
 pub use light_paths::{LightPath, LightPaths, LightVertex};

@@ -1,5 +1,6 @@
 //! How light travels: what happens at a surface point, and the one random walk of both directions.
 
 pub mod class;
+pub mod merge;
 pub mod shading;
 pub mod walk;

@@ -61,6 +61,8 @@ pub struct Vertex<'a> {
     pub depth: u32,
     /// Length walked, world units.
     pub length: f32,
+    /// Every event so far was at a delta lobe; true at the first vertex.
+    pub specular: bool,
 }
 
 /// What to do at a vertex.
@@ -92,6 +94,8 @@ pub struct Escape {
     pub throughput: Rgb,
     /// Edges walked, the last included.
     pub depth: u32,
+    /// Every event was at a delta lobe.
+    pub specular: bool,
 }
 
 /// The camera's ray beyond the emitters it meets first, with the length passed: what `hide_emitters` means in Mitsuba 3. A hidden emitter is
@@ -133,16 +137,16 @@ pub fn walk<'a, S: Stream>(
     mut visit: impl FnMut(&Vertex<'a>, &mut S, &mut Tally) -> Step,
 ) -> Option<Escape> {
     let Start { mut ray, mut throughput, mut length } = start;
-    let mut depth = 0;
+    let (mut depth, mut specular) = (0, true);
     loop {
         depth += 1;
         tally.rays += 1;
         let Some(hit) = scene.intersect(&ray) else {
-            return Some(Escape { ray, throughput, depth });
+            return Some(Escape { ray, throughput, depth, specular });
         };
         length += hit.t;
         let point = SurfacePoint::new(&hit, scene.bsdf(hit.shape), ray.d);
-        let vertex = Vertex { hit, point, from: ray.o, d: ray.d, throughput, depth, length };
+        let vertex = Vertex { hit, point, from: ray.o, d: ray.d, throughput, depth, length, specular };
         let Step::Scatter(lobes, probability) = visit(&vertex, stream, tally) else { return None };
         let Some(point) = point else {
             tally.sides_disagree += 1;
@@ -165,6 +169,7 @@ pub fn walk<'a, S: Stream>(
             tally.non_finite += 1;
             return None;
         }
+        specular &= scattered.delta;
         ray = point.end.ray(scattered.d);
     }
 }

@@ -1,0 +1,119 @@
+//! Target functions over measurement points.
+//!
+//! [STF (11), (12)]: a path's target is the largest value of the points it reaches; 0 where it reaches none, so that the supports of all rungs
+//! above the uniform one are the same.
+
+use super::points::Points;
+use super::regions::{Refinement, Regions};
+use clap::ValueEnum;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// A target function of a ladder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rung {
+    /// The constant 1
+    Uniform,
+    /// 1 where the path reaches a measurement point, else 0
+    Visibility,
+    /// Visibility over kernel size
+    Kernel,
+    /// The sampler's own: over kernel size and photon density
+    Target,
+}
+
+/// `epsilon` of the compressed inverse kernel size and inverse density [STF (11)].
+const EPSILON: f64 = 1e-4;
+
+/// Values of the targets at one measurement point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Aim {
+    /// Inverse kernel size, compressed.
+    pub kernel: f32,
+    /// Inverse kernel size times inverse density, both compressed.
+    pub full: f32,
+    /// Region, for statistics; 0 without regions.
+    pub leaf: u32,
+}
+
+/// What turns kernel sizes and densities into targets, from iteration to iteration.
+#[derive(Clone, Debug)]
+pub struct Aimer {
+    /// Largest kernel size and mean kernel target of the first iteration, before the radius schedule: a fixed scale, so that a rung's
+    /// normalisation means the same in every iteration. [STF (11)] takes the current maximum, which changes the target by a factor alone
+    /// that no chain notices, and moves where it saturates.
+    scale: Option<(f64, f64)>,
+    /// Regions of a spatial or image target.
+    pub regions: Option<Regions>,
+    /// Where densities are read.
+    pub refinement: Refinement,
+    /// Regions read in the last iteration.
+    pub region_count: usize,
+}
+
+/// Which place a measurement point has in the regions' tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Its position in space.
+    Space,
+    /// Its pixel.
+    Image {
+        /// Pixels across.
+        width: u32,
+    },
+}
+
+impl Place {
+    fn of(self, points: &Points<'_>, index: usize) -> Vec3 {
+        let at = &points.all()[index];
+        match self {
+            Place::Space => at.point.end.p,
+            Place::Image { width } => Vec3::new((at.pixel % width) as f32 + 0.5, (at.pixel / width) as f32 + 0.5, 0.0),
+        }
+    }
+}
+
+impl Aimer {
+    /// Nothing known yet.
+    pub fn new(regions: Option<Regions>, refinement: Refinement) -> Self {
+        Self { scale: None, regions, refinement, region_count: 0 }
+    }
+
+    /// Targets at every point. `shrink` is the radius schedule's factor on the first iteration's radii.
+    pub fn aim(&mut self, points: &Points<'_>, place: Place, shrink: f64) -> Vec<Aim> {
+        let sizes: Vec<f64> = points.all().iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
+        if sizes.is_empty() {
+            return Vec::new();
+        }
+        let (largest, mean) = *self.scale.get_or_insert_with(|| {
+            let largest = sizes.iter().copied().fold(0.0, f64::max);
+            let mean = sizes.iter().map(|s| inverse(s / largest)).sum::<f64>() / sizes.len() as f64;
+            (largest, mean)
+        });
+        let mut aims: Vec<Aim> = sizes.iter().map(|s| Aim { kernel: (inverse(s / largest) / mean) as f32, ..Aim::default() }).collect();
+        let Some(regions) = &mut self.regions else {
+            aims.iter_mut().for_each(|aim| aim.full = aim.kernel);
+            return aims;
+        };
+        aims.iter_mut().enumerate().for_each(|(i, aim)| aim.leaf = regions.leaf(place.of(points, i)));
+        let (densities, count) = regions.densities(self.refinement);
+        self.region_count = count;
+        // Nothing known: the full target starts as the kernel's (theory B.7).
+        let density = |aim: &Aim| densities.get(aim.leaf as usize).copied();
+        let densest = aims.iter().filter_map(density).fold(0.0, f64::max);
+        let values: Vec<f64> = aims
+            .iter()
+            .map(|aim| f64::from(aim.kernel) * density(aim).filter(|_| densest > 0.0).map_or(1.0, |d| inverse(d / densest)))
+            .collect();
+        // A mean of one keeps the normalisation alike while densities are being learned.
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        aims.iter_mut().zip(values).for_each(|(aim, value)| aim.full = (value / mean) as f32);
+        aims
+    }
+}
+
+/// `1/(x + epsilon)`, `x` in [0, 1]: a factor of [STF (11)] up to its constant.
+fn inverse(x: f64) -> f64 {
+    1.0 / (x + EPSILON)
+}
