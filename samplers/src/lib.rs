@@ -2,8 +2,12 @@
 //!
 //! A light path is a function of a [`Stream`]. The same function serves independent numbers, a Markov chain or a replay.
 
+pub mod diagnostics;
+pub mod ladder;
 pub mod sampler;
 pub mod stream;
 
-pub use sampler::{Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
+pub use diagnostics::{LadderReport, RungReport, TRACE_POINTS};
+pub use ladder::{Allocation, Combine, Ladder, LadderSettings, Normaliser};
+pub use sampler::{CELLS, Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
 pub use stream::{Key, Purpose, Recorder, Replay, Stream, UniformStream};

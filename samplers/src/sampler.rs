@@ -15,7 +15,28 @@ pub trait LightPathSpace: Sync {
     /// Values of the rungs' target functions at a path, rung 0 first: the constant 1. `values` has one place a rung; a space with
     /// fewer targets than places is a caller's mistake. All are finite and not negative, and each rung's support contains the next's.
     fn targets(&self, path: &Self::Path, values: &mut [f64]);
+
+    /// What the path adds to the relative variance of the measurements when it is drawn with density one: the sum over measurements of
+    /// its squared contribution relative to the measurement, in any constant scale. The allocation of steps minimises its integral
+    /// divided by the density of all rungs together. Not negative and finite.
+    fn usefulness(&self, _path: &Self::Path) -> f64 {
+        1.0
+    }
+
+    /// One of [`CELLS`] cells that the path contributes to, a hash of a measurement it touches; `None` if it touches none. How counts per
+    /// cell scatter over ensembles tells how much a chain's correlation costs.
+    fn cell(&self, _path: &Self::Path) -> Option<u32> {
+        None
+    }
+
+    /// What the path cost to trace and to use, in any constant unit (rays and deposits). Positive and finite.
+    fn cost(&self, _path: &Self::Path) -> f64 {
+        1.0
+    }
 }
+
+/// Number of cells of [`LightPathSpace::cell`]; a larger value is taken modulo this one.
+pub const CELLS: usize = 1024;
 
 /// One light path as a sampler hands it out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +45,15 @@ pub struct Drawn {
     pub index: u64,
     /// The rung that drew it.
     pub stratum: usize,
-    /// Weight within its stratum, `w_i(u)/T_i(u)` ([`PhotonSampler`]); what only the iteration's end knows is in [`Draw::scales`].
+    /// Weight within its stratum, `repeats * w_i(u)/T_i(u)` ([`PhotonSampler`]); what only the iteration's end knows is in
+    /// [`Draw::scales`].
     pub weight: f64,
+    /// The same within the mixture of all strata but the last, for statistics that shape the last rung's target: they must not depend
+    /// on its own paths. Equal to `weight` if there is one stratum; 0 for the last of several.
+    pub pilot_weight: f64,
+    /// Counted steps of a chain that this path stands for: a rejected proposal counts the state again, but it is handed out once, when
+    /// the chain leaves it. 1 for an independent path.
+    pub repeats: u32,
 }
 
 /// What an iteration's draw leaves.
@@ -96,7 +124,7 @@ impl PhotonSampler for Uniform {
             for index in b * BATCH..count.min((b + 1) * BATCH) {
                 let mut stream = Key { seed, iteration, index, purpose: Purpose::Light }.stream();
                 space.trace(&mut stream, &mut path);
-                emit(&mut accumulator, &path, Drawn { index, stratum: 0, weight: 1.0 });
+                emit(&mut accumulator, &path, Drawn { index, stratum: 0, weight: 1.0, pilot_weight: 1.0, repeats: 1 });
             }
             accumulator
         };
