@@ -78,6 +78,10 @@ pub trait Integrator: Send {
     fn stateless(&self) -> bool {
         true
     }
+    /// What the method can say about itself so far, as it stands in metadata and records.
+    fn diagnostics(&self) -> Option<serde_json::Value> {
+        None
+    }
 }
 
 /// A method refuses its settings or its scene.

@@ -19,7 +19,7 @@ pub struct AimedPath {
 }
 
 /// All light subpaths of a scene, aimed at an iteration's measurement points.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct AimedPaths<'a> {
     /// The paths.
     pub light: LightPaths<'a>,

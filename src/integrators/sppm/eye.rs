@@ -42,7 +42,7 @@ pub(super) struct Seen<'a> {
 }
 
 /// Camera subpaths of a scene.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(super) struct Eye<'a> {
     pub(super) scene: &'a Scene,
     pub(super) common: Common,

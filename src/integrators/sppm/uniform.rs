@@ -1,0 +1,74 @@
+//! Independent light paths: photons into a grid, then each measurement point gathers and is gone.
+
+use super::{Glossy, IterationStats, Sppm};
+use crate::image::film::Film;
+use crate::math::Rgb;
+use crate::photons::grid::{Photon, PhotonGrid};
+use crate::photons::radius::shrink;
+use crate::samplers::{Drawn, PhotonSampler, Uniform};
+use crate::targets::LightPath;
+use crate::targets::points::MeasurementPoint;
+use crate::transport::merge::{accepts, merge};
+use crate::transport::walk::Tally;
+
+impl Sppm<'_> {
+    /// An iteration; it depends on its index, settings and seed alone.
+    pub(super) fn iterate_uniform(&self, i: u64, film: &mut Film, stats: &mut IterationStats) -> Glossy {
+        let (grid, scales) = self.shoot(i, stats);
+        let radius = self.radius_at(i);
+        let width = self.eye.size.0;
+        let sample = |(tally, glossy): &mut (Tally, Glossy), x: usize, y: usize| {
+            let seen = self.eye.sample(i, y * width + x, radius, tally);
+            glossy.see(&seen);
+            tally.finite(self.emission(&seen) + seen.measured.map_or(Rgb::BLACK, |m| self.gather(&m, &grid, &scales)))
+        };
+        let mut all = Glossy::default();
+        film.add_eye_samples(Default::default, sample, |(tally, glossy): (Tally, Glossy)| {
+            stats.count(&tally);
+            all.add(&glossy);
+        });
+        all
+    }
+
+    /// Light subpaths to photons, sorted into a grid.
+    fn shoot(&self, i: u64, stats: &mut IterationStats) -> (PhotonGrid, Vec<f64>) {
+        let paths = self.light_paths();
+        let keep = |(photons, tally): &mut (Vec<Photon>, Tally), path: &LightPath, drawn: Drawn| {
+            tally.add(&path.tally);
+            photons.extend(path.vertices.iter().map(|v| Photon {
+                p: v.end.p,
+                n_g: v.end.n_g,
+                wi: v.wi,
+                flux: v.flux * drawn.weight as f32,
+                depth: v.depth as u16,
+                stratum: drawn.stratum as u16,
+            }));
+        };
+        let mut sampler = Uniform { seed: self.eye.common.seed };
+        let count = if paths.max_depth == 0 { 0 } else { self.photon_count };
+        let draw = sampler.draw(&paths, i, count, || (Vec::new(), Tally::default()), keep);
+        let mut photons = Vec::with_capacity(draw.batches.iter().map(|(p, _)| p.len()).sum());
+        for (batch, tally) in draw.batches {
+            photons.extend(batch);
+            stats.count(&tally);
+        }
+        stats.light_paths += draw.traced;
+        let cell = self.cell * shrink(i, self.settings.alpha) as f32;
+        (PhotonGrid::build(photons, cell), draw.scales)
+    }
+
+    /// Flux density around a measurement point, strata scaled, times throughput and BSDF.
+    fn gather(&self, at: &MeasurementPoint<'_>, grid: &PhotonGrid, scales: &[f64]) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        let depths = self.eye.depths();
+        let (n_g, n_s) = (at.point.end.n_g, at.point.frame.n);
+        grid.query(at.point.end.p, at.radius, |photon, _| {
+            let depth = at.depth + u32::from(photon.depth);
+            if depth <= depths.max && depth >= depths.min && accepts(n_g, n_s, photon.n_g, photon.wi) {
+                let scale = scales[usize::from(photon.stratum)] as f32;
+                sum += merge(&at.point, photon.wi, self.eye.threshold) * photon.flux * scale;
+            }
+        });
+        at.throughput * sum * (1.0 / at.kernel_size())
+    }
+}
