@@ -293,9 +293,11 @@ impl PhotonSettings {
     fn validate_chains(&self) -> Result<(), String> {
         let chains = &self.chains;
         if self.sampler == SamplerName::Uniform && *chains != ChainSettings::default() {
-            return Err("rungs, combine, burn-in, ensembles, acceptance, normaliser, steps and the options of densities belong to Metropolis \
+            return Err(
+                "rungs, combine, burn-in, ensembles, acceptance, normaliser, steps and the options of densities belong to Metropolis \
                         samplers: give --sampler visibility, kernel, image or spatial"
-                .into());
+                    .into(),
+            );
         }
         if let Some(rungs) = &chains.rungs {
             if self.sampler == SamplerName::Visibility {

@@ -79,15 +79,7 @@ impl<'a> Eye<'a> {
         self.measure(pixel, jitter, lens, Radius::Footprints(1.0), &mut stream, tally).measured
     }
 
-    fn measure<S: Stream>(
-        &self,
-        pixel: usize,
-        jitter: Vec2,
-        lens: Vec2,
-        radius: Radius,
-        stream: &mut S,
-        tally: &mut Tally,
-    ) -> Seen<'a> {
+    fn measure<S: Stream>(&self, pixel: usize, jitter: Vec2, lens: Vec2, radius: Radius, stream: &mut S, tally: &mut Tally) -> Seen<'a> {
         let corner = Vec2::new((pixel % self.size.0) as f32, (pixel / self.size.0) as f32);
         let camera = self.scene.camera();
         let camera_ray = camera.ray(corner + jitter, lens);

@@ -140,9 +140,7 @@ mod tests {
         let mut point = |scale: f32| Vec3::new(s.next_1d() - 0.5, s.next_1d() - 0.5, 0.1 * s.next_1d()) * scale;
         // Radii over a range of 1, of 50, and of 1e9, wider than the levels.
         for (scale, spread) in [(1.0f32, 0.0f32), (1e3, 4.0), (1e-3, 21.0)] {
-            let balls: Vec<(Vec3, f32)> = (0..3000)
-                .map(|i| (point(scale), 0.05 * scale * (-spread * (i as f32 / 3000.0)).exp()))
-                .collect();
+            let balls: Vec<(Vec3, f32)> = (0..3000).map(|i| (point(scale), 0.05 * scale * (-spread * (i as f32 / 3000.0)).exp())).collect();
             let grid = DiskGrid::build(balls.iter().copied());
             let mut found_any = 0;
             for i in 0..2000 {
@@ -151,8 +149,7 @@ mod tests {
                 let mut found = Vec::new();
                 grid.containing(p, |index| found.push(index));
                 found.sort_unstable();
-                let expected: Vec<u32> =
-                    (0u32..).zip(&balls).filter(|(_, (c, r))| c.distance_squared(p) < r * r).map(|(i, _)| i).collect();
+                let expected: Vec<u32> = (0u32..).zip(&balls).filter(|(_, (c, r))| c.distance_squared(p) < r * r).map(|(i, _)| i).collect();
                 found_any += expected.len();
                 assert_eq!(found, expected, "scale {scale}, spread {spread}");
             }
