@@ -1,5 +1,9 @@
 //! What a ladder can say about itself.
 
+pub(crate) mod blocks;
+pub(crate) mod dispersion;
+pub(crate) mod rhat;
+
 use serde::{Deserialize, Serialize};
 
 /// The state of a [`Ladder`](crate::Ladder) after its last draw. "Cumulative" means over all draws, burn-in left out.

@@ -1,25 +1,75 @@
 //! A ladder of Markov chains from the uniform law to a hard target.
+//!
+//! Rung 0 draws independent paths; rung c is a chain with the law `T_c/b_c`; neighbours exchange states (module `ensemble`). A draw runs
+//! `ensembles` such groups side by side, joins their paths by fixed weights (`weights`), and estimates the normalisations (`normalisation`)
+//! that only its end knows and [`Draw::scales`] carries. A ladder with two rungs is visibility-driven photon tracing [HACHISUKA11], one with
+//! four the spatial target function [STF].
 
+mod ensemble;
+mod normalisation;
+mod schedule;
 mod settings;
+mod start;
+mod summary;
+mod weights;
 
 pub use settings::{Allocation, Combine, LadderSettings, Normaliser};
 
-use crate::diagnostics::LadderReport;
-use crate::sampler::{Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
+use crate::allocation::{floors, steps_for};
+use crate::diagnostics::dispersion::Dispersion;
+use crate::diagnostics::{LadderReport, TRACE_POINTS};
+use crate::sampler::{Draw, Drawn, LightPathSpace, PhotonSampler};
+use crate::state::Chain;
+use ensemble::{Outcome, Plan};
+use normalisation::Normalisation;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use summary::Summary;
+use weights::Mixture;
 
-/// Chains at several target functions that exchange states. Serialises to everything a later draw depends on.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// Dispersion of chains that the first allocation assumes.
+const FIRST_DISPERSION: f64 = 5.0;
+/// Samples for the allocation per rung and ensemble: 4096 for four rungs and sixteen ensembles.
+const SAMPLES: u64 = 64;
+
+/// Chains at several target functions that exchange states. Serialises to everything a later draw depends on: coordinates, step sizes,
+/// normalisations, dispersions and shares, but no path.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ladder {
     settings: LadderSettings,
     draws: u64,
     traced: u64,
+    /// Chains of rungs 1 and up, by ensemble.
+    chains: Vec<Vec<Chain>>,
+    normalisation: Normalisation,
+    dispersions: Vec<Dispersion>,
+    /// Shares of the steps in the next draw.
+    shares: Vec<f64>,
+    exchanges: bool,
+    summary: Summary,
 }
 
 impl Ladder {
     /// A ladder that has drawn nothing.
     pub fn new(settings: LadderSettings) -> Self {
-        Self { settings, draws: 0, traced: 0 }
+        let rungs = settings.rungs.max(1);
+        Self {
+            draws: 0,
+            traced: 0,
+            chains: vec![vec![Chain::default(); rungs - 1]; settings.ensembles.max(1)],
+            normalisation: Normalisation::new(rungs),
+            dispersions: vec![Dispersion::default(); rungs],
+            shares: schedule::fixed_shares(rungs),
+            exchanges: true,
+            summary: Summary::new(rungs),
+            settings,
+        }
+    }
+
+    /// The same ladder with its rungs on their own: no exchange between chains, no independent path into rung 1. For ablations: chains
+    /// keep their laws but not their way from island to island.
+    pub fn without_exchanges(self) -> Self {
+        Self { exchanges: false, ..self }
     }
 
     /// The settings it was made with.
@@ -29,7 +79,71 @@ impl Ladder {
 
     /// What the ladder knows about itself after its last draw.
     pub fn report(&self) -> LadderReport {
-        LadderReport { draws: self.draws, traced: self.traced, ensembles: self.settings.ensembles, round_trips: 0, rungs: Vec::new() }
+        self.summary.report(self)
+    }
+
+    /// Replaces the normalisations that the weights of the next draw assume, rung 0 first. Any positive numbers leave the estimates
+    /// unbiased, wrong ones cost variance: a test of the first, or knowledge from elsewhere for the second. Returns whether the list has one
+    /// positive finite number a rung; otherwise nothing changes.
+    pub fn assume_normalisations(&mut self, b: &[f64]) -> bool {
+        let fits = b.len() == self.strata() && b.iter().all(|b| *b > 0.0 && b.is_finite());
+        if fits {
+            self.normalisation.assumed = b.to_vec();
+        }
+        fits
+    }
+
+    /// `tau` of every rung: 1 for rung 0, `unknown` where nothing is known.
+    fn taus(&self, unknown: f64) -> Vec<f64> {
+        let tau = |(rung, dispersion): (usize, &Dispersion)| if rung == 0 { 1.0 } else { dispersion.tau().unwrap_or(unknown) };
+        self.dispersions.iter().enumerate().map(tau).collect()
+    }
+
+    /// Independent paths, starts of all chains, first normalisations and shares.
+    fn start<P: LightPathSpace>(&mut self, space: &P, iteration: u64) {
+        let address = (self.settings.seed, iteration);
+        let measured = self.settings.allocation == Allocation::Measured;
+        let pool = start::pool(space, address, self.strata(), self.settings.start_up, measured);
+        self.traced += self.settings.start_up;
+        if self.normalisation.assumed.is_empty() {
+            self.normalisation.assumed = pool.normalisations();
+        }
+        self.normalisation.add_independent(&pool.first());
+        for rung in 1..self.strata() {
+            pool.start(space, address, rung, self.chains.iter_mut().map(|chains| &mut chains[rung - 1]));
+        }
+        if measured {
+            let (problem, costs) = pool.problem(&self.taus(FIRST_DISPERSION));
+            if let Some(shares) = problem.solve(&floors(self.strata())) {
+                self.shares = steps_for(&shares, &costs);
+            }
+        }
+    }
+
+    fn plan<'a>(&self, iteration: u64, count: u64, shares: &'a [f64]) -> Plan<'a> {
+        let settings = &self.settings;
+        // Every ensemble takes the same strides, from the steps of the largest.
+        let steps = |share: &f64| (share * count.div_ceil(self.chains.len() as u64) as f64).ceil() as u64 + shares.len() as u64;
+        let stride = |points: u64| shares.iter().map(|share| steps(share).div_ceil(points).max(1)).collect();
+        Plan {
+            seed: settings.seed,
+            iteration,
+            shares,
+            mixture: Mixture::new(settings.combine, shares, &self.normalisation.assumed, &self.taus(1.0)),
+            burn_in: if self.draws == 0 { settings.first_burn_in } else { settings.later_burn_in },
+            acceptance: settings.acceptance,
+            exchanges: self.exchanges,
+            trace_strides: stride(TRACE_POINTS as u64),
+            sample_strides: if settings.allocation == Allocation::Measured { stride(SAMPLES) } else { Vec::new() },
+        }
+    }
+
+    /// Shares of the next draw, from this one's samples.
+    fn allocate(&mut self, summary: &summary::DrawSummary) {
+        let (problem, costs) = summary.problem(&self.normalisation.assumed, &self.taus(FIRST_DISPERSION));
+        if let Some(shares) = problem.solve(&floors(self.strata())) {
+            self.shares = steps_for(&shares, &costs);
+        }
     }
 }
 
@@ -50,11 +164,44 @@ impl PhotonSampler for Ladder {
         P: LightPathSpace,
         A: Send,
     {
-        // Rung 0 alone, until the chains stand.
-        let mut draw = Uniform { seed: self.settings.seed }.draw(space, iteration, count, start, emit);
-        draw.scales.resize(self.strata(), 0.0);
+        let traced_before = self.traced;
+        let rungs = self.strata();
+        if self.draws == 0 {
+            if rungs > 1 {
+                self.start(space, iteration);
+            } else {
+                self.normalisation.assumed = vec![1.0];
+            }
+        }
+        let shares = self.shares.clone();
+        let plan = self.plan(iteration, count, &shares);
+        let ensembles = self.chains.len() as u64;
+        let run = |(ensemble, chains): (usize, &mut Vec<Chain>)| {
+            let e = ensemble as u64;
+            let first = e * (count / ensembles) + e.min(count % ensembles);
+            let steps = count / ensembles + u64::from(e < count % ensembles);
+            ensemble::run(space, &plan, e, (first, steps), chains, start(), &emit)
+        };
+        let outcomes: Vec<Outcome<A>> = self.chains.par_iter_mut().enumerate().map(run).collect();
+        let mut batches = Vec::with_capacity(outcomes.len());
+        let mut tallies = Vec::with_capacity(outcomes.len());
+        for outcome in outcomes {
+            self.traced += outcome.traced;
+            batches.push(outcome.accumulator);
+            tallies.push(outcome.tallies);
+        }
+        let drawn = summary::DrawSummary::new(tallies);
+        for (rung, dispersion) in self.dispersions.iter_mut().enumerate() {
+            drawn.disperse(rung, dispersion);
+        }
+        let pooled_below = if self.settings.normaliser == Normaliser::Pooled { self.settings.poolable } else { 0 };
+        self.normalisation.update(&drawn.ratios(), pooled_below);
+        if self.settings.allocation == Allocation::Measured && rungs > 1 {
+            self.allocate(&drawn);
+        }
         self.draws += 1;
-        self.traced += draw.traced;
-        draw
+        let scales = (0..rungs).map(|rung| drawn.scale(rung, self.normalisation.b(rung))).collect();
+        self.summary.add(&drawn, &shares, &plan.trace_strides);
+        Draw { batches, scales, traced: self.traced - traced_before }
     }
 }

@@ -2,9 +2,13 @@
 //!
 //! A light path is a function of a [`Stream`]. The same function serves independent numbers, a Markov chain or a replay.
 
+mod adapt;
+mod allocation;
 pub mod diagnostics;
 pub mod ladder;
+mod mutation;
 pub mod sampler;
+mod state;
 pub mod stream;
 
 pub use diagnostics::{LadderReport, RungReport, TRACE_POINTS};

@@ -89,7 +89,7 @@ fn mix(mut z: u64) -> u64 {
 
 /// The upper 24 bits as a number in [0, 1); never 1.
 #[inline(always)]
-fn unit(bits: u32) -> f32 {
+pub(crate) fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
@@ -101,15 +101,29 @@ pub struct UniformStream {
     spare: Option<u32>,
 }
 
-impl Stream for UniformStream {
+impl UniformStream {
+    /// 32 random bits: what [`Stream::next_1d`] makes a coordinate of.
     #[inline(always)]
-    fn next_1d(&mut self) -> f32 {
+    pub(crate) fn bits(&mut self) -> u32 {
         if let Some(bits) = self.spare.take() {
-            return unit(bits);
+            return bits;
         }
         let bits = self.rng.next_u64();
         self.spare = Some(bits as u32);
-        unit((bits >> 32) as u32)
+        (bits >> 32) as u32
+    }
+
+    /// A number in [0, 1) with 53 bits: for acceptances, whose ratios of targets can be far below a coordinate's resolution.
+    #[inline(always)]
+    pub(crate) fn chance(&mut self) -> f64 {
+        (self.rng.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+}
+
+impl Stream for UniformStream {
+    #[inline(always)]
+    fn next_1d(&mut self) -> f32 {
+        unit(self.bits())
     }
     #[inline(always)]
     fn next_2d(&mut self) -> [f32; 2] {

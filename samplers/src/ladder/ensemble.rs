@@ -1,0 +1,370 @@
+//! One ensemble of a draw: a chain a rung, run by one thread from start to end.
+//!
+//! A step of rung c mutates its state and accepts with `min(1, T_c(y)/T_c(x))` [KELEMEN02]; the state *after* it is counted; then the chain
+//! tries an exchange with one neighbour, accepted with `min(1, T_a(x_b) T_b(x_a) / (T_a(x_a) T_b(x_b)))` [STF 4.3]. A step of rung 0 is an
+//! independent path `u`, which rung 1 takes with `min(1, T_1(u)/T_1(x_1))`: its old state would go to rung 0, whose next path is independent
+//! of it, so it is dropped [HACHISUKA11 4]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
+//! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
+
+use super::schedule::Schedule;
+use super::weights::Mixture;
+use crate::adapt::StepSize;
+use crate::diagnostics::blocks::{BLOCKS, Blocks};
+use crate::mutation::Coordinates;
+use crate::sampler::{CELLS, Drawn, LightPathSpace};
+use crate::state::{Chain, Life, State};
+use crate::stream::{Key, Purpose, UniformStream};
+
+/// What all ensembles of a draw share.
+pub(super) struct Plan<'a> {
+    pub(super) seed: u64,
+    pub(super) iteration: u64,
+    pub(super) shares: &'a [f64],
+    pub(super) mixture: Mixture,
+    pub(super) burn_in: u64,
+    pub(super) acceptance: f64,
+    pub(super) exchanges: bool,
+    /// Steps of each rung between two points of its trace.
+    pub(super) trace_strides: Vec<u64>,
+    /// Steps of each rung between two samples for the allocation; none are taken if it is empty.
+    pub(super) sample_strides: Vec<u64>,
+}
+
+/// What one rung of one ensemble did in a draw.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tally {
+    /// Counted steps, by block.
+    pub(super) steps: [u64; BLOCKS],
+    /// Ratio of the next rung's target to this one's.
+    pub(super) ratio: Blocks,
+    /// Logarithm of the last rung's target.
+    pub(super) log: Blocks,
+    pub(super) uncounted: u64,
+    pub(super) mutated: u64,
+    pub(super) accepted: u64,
+    /// Exchanges with the next rung.
+    pub(super) attempts: u64,
+    pub(super) exchanged: u64,
+    pub(super) round_trips: u64,
+    pub(super) dead: u64,
+    /// Cost of the proposals after burn-in.
+    pub(super) cost: f64,
+    pub(super) proposals: u64,
+    /// Counted steps by cell.
+    pub(super) cells: Vec<u32>,
+    pub(super) trace: Vec<f32>,
+    /// Rows of all targets and the usefulness.
+    pub(super) samples: Vec<f64>,
+    until_trace: u64,
+    until_sample: u64,
+}
+
+/// What an ensemble leaves.
+pub(super) struct Outcome<A> {
+    pub(super) accumulator: A,
+    pub(super) tallies: Vec<Tally>,
+    pub(super) traced: u64,
+}
+
+/// Where a counted step stands.
+#[derive(Clone, Copy)]
+struct Place {
+    block: usize,
+    /// Number of the step within the iteration.
+    index: u64,
+}
+
+struct Ensemble<'a, P: LightPathSpace, A, E> {
+    space: &'a P,
+    plan: &'a Plan<'a>,
+    random: UniformStream,
+    /// States of rungs 1 and up.
+    states: Vec<State<P::Path>>,
+    steps: Vec<(StepSize, u64)>,
+    proposal: State<P::Path>,
+    tallies: Vec<Tally>,
+    accumulator: A,
+    emit: &'a E,
+    traced: u64,
+}
+
+/// Runs ensemble number `ensemble` for `steps` steps, whose numbers begin with `first`; `chains` are its stored chains.
+pub(super) fn run<P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)>(
+    space: &P,
+    plan: &Plan<'_>,
+    ensemble: u64,
+    (first, steps): (u64, u64),
+    chains: &mut [Chain],
+    accumulator: A,
+    emit: &E,
+) -> Outcome<A> {
+    let mut run = Ensemble::new(space, plan, ensemble, chains, accumulator, emit);
+    let rungs = plan.shares.len();
+    if rungs > 1 {
+        for _ in 0..plan.burn_in {
+            for rung in 0..rungs {
+                run.step(rung, None);
+            }
+        }
+    }
+    let mut schedule = Schedule::new(plan.shares);
+    let mut step = 0;
+    for block in 0..BLOCKS {
+        let end = (u128::from(steps) * (block as u128 + 1) / BLOCKS as u128) as u64;
+        while step < end {
+            run.step(schedule.next(), Some(Place { block, index: first + step }));
+            step += 1;
+        }
+    }
+    run.finish(chains)
+}
+
+impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A, E> {
+    /// Replays the stored states under the present targets.
+    fn new(space: &'a P, plan: &'a Plan<'a>, ensemble: u64, chains: &[Chain], accumulator: A, emit: &'a E) -> Self {
+        let rungs = plan.shares.len();
+        let mut random = Key { seed: plan.seed, iteration: plan.iteration, index: ensemble, purpose: Purpose::Mutate }.stream();
+        let mut tallies: Vec<Tally> = (0..rungs).map(|_| Tally { cells: vec![0; CELLS], ..Tally::default() }).collect();
+        let mut traced = 0;
+        let mut states = Vec::with_capacity(chains.len());
+        for (rung, chain) in chains.iter().enumerate().map(|(i, chain)| (i + 1, chain)) {
+            let mut state = State::new(rungs);
+            state.climbed = chain.climbed;
+            if chain.life != Life::Empty {
+                state.replay(space, rung, &chain.coordinates, &mut random);
+                state.settle(rung);
+                traced += 1;
+                tallies[rung].dead += u64::from(state.life == Life::Dead);
+            }
+            states.push(state);
+        }
+        let steps = chains.iter().map(|chain| (chain.step.clone(), chain.turn)).collect();
+        Self { space, plan, random, states, steps, proposal: State::new(rungs), tallies, accumulator, emit, traced }
+    }
+
+    /// Hands out what is left and stores the chains.
+    fn finish(mut self, chains: &mut [Chain]) -> Outcome<A> {
+        for rung in 1..=self.states.len() {
+            self.leave(rung);
+        }
+        for ((chain, state), (step, turn)) in chains.iter_mut().zip(self.states).zip(self.steps) {
+            *chain = Chain { coordinates: state.coordinates, life: state.life, climbed: state.climbed, step, turn };
+        }
+        Outcome { accumulator: self.accumulator, tallies: self.tallies, traced: self.traced }
+    }
+
+    #[inline]
+    fn step(&mut self, rung: usize, counted: Option<Place>) {
+        if rung == 0 {
+            self.uniform_step(counted);
+        } else {
+            self.chain_step(rung, counted);
+        }
+    }
+
+    /// Traces the proposal: a mutation of the state of `rung`, or an independent path.
+    #[inline]
+    fn propose(&mut self, rung: usize, mutate: bool, counted: bool) {
+        let mut stream = if mutate {
+            let exponent = self.steps[rung - 1].0.exponent();
+            Coordinates::mutated(&self.states[rung - 1].coordinates, exponent, &mut self.random, &mut self.proposal.coordinates)
+        } else {
+            Coordinates::fresh(&mut self.random, &mut self.proposal.coordinates)
+        };
+        self.space.trace(&mut stream, &mut self.proposal.path);
+        self.space.targets(&self.proposal.path, &mut self.proposal.values);
+        self.traced += 1;
+        if counted {
+            self.tallies[rung].proposals += 1;
+            self.tallies[rung].cost += self.space.cost(&self.proposal.path);
+        }
+    }
+
+    fn uniform_step(&mut self, counted: Option<Place>) {
+        self.propose(0, false, counted.is_some());
+        if let Some(place) = counted {
+            self.count_uniform(place);
+        }
+        if self.states.is_empty() || !self.plan.exchanges {
+            return;
+        }
+        let (new, old) = (self.proposal.values[1], self.states[0].values[1]);
+        let alive = self.states[0].life == Life::Alive;
+        let taken = new > 0.0 && (!alive || self.random.chance() * old < new);
+        if counted.is_some() {
+            self.tallies[0].attempts += 1;
+            self.tallies[0].exchanged += u64::from(taken);
+        }
+        if taken {
+            self.tallies[0].round_trips += u64::from(self.states[0].climbed && counted.is_some());
+            self.take(1, false);
+        }
+    }
+
+    /// The proposal becomes the state of `rung`; `climbed` is whether it has been on the last rung.
+    #[inline]
+    fn take(&mut self, rung: usize, climbed: bool) {
+        self.leave(rung);
+        let state = &mut self.states[rung - 1];
+        std::mem::swap(state, &mut self.proposal);
+        state.repeats = 0;
+        state.life = Life::Alive;
+        state.climbed = climbed;
+        state.settle(rung);
+    }
+
+    fn chain_step(&mut self, rung: usize, counted: Option<Place>) {
+        let state = &self.states[rung - 1];
+        let (life, old, climbed) = (state.life, state.values[rung], state.climbed);
+        self.propose(rung, life != Life::Empty, counted.is_some());
+        let new = self.proposal.values[rung];
+        if life == Life::Alive {
+            let accepted = self.random.chance() * old < new;
+            self.steps[rung - 1].0.learn(accepted, self.plan.acceptance);
+            if accepted {
+                self.take(rung, climbed);
+            }
+            if let Some(place) = counted {
+                self.tallies[rung].mutated += 1;
+                self.tallies[rung].accepted += u64::from(accepted);
+                self.count(rung, place);
+            }
+        } else {
+            // The first visible proposal is forced; the step that found it is not counted.
+            if new > 0.0 {
+                self.take(rung, false);
+            }
+            self.tallies[rung].uncounted += u64::from(counted.is_some());
+        }
+        self.exchange_by_turns(rung, counted.is_some());
+    }
+
+    /// An independent path is counted and handed out at once: it never stands for more than one step.
+    #[inline]
+    fn count_uniform(&mut self, place: Place) {
+        let tally = &mut self.tallies[0];
+        tally.steps[place.block] += 1;
+        if let Some(next) = self.proposal.values.get(1) {
+            tally.ratio.add(place.block, *next);
+        }
+        sample(tally, self.plan, 0, &self.proposal, self.space);
+        self.proposal.repeats = 1;
+        self.proposal.index = place.index;
+        hand_out(self.space, self.plan, 0, &mut self.proposal, tally, &mut self.accumulator, self.emit);
+    }
+
+    #[inline]
+    fn count(&mut self, rung: usize, place: Place) {
+        let (state, tally) = (&mut self.states[rung - 1], &mut self.tallies[rung]);
+        if state.repeats == 0 {
+            state.index = place.index;
+        }
+        state.repeats += 1;
+        tally.steps[place.block] += 1;
+        tally.ratio.add(place.block, state.ratio);
+        tally.log.add(place.block, state.log);
+        if tally.until_trace == 0 {
+            tally.until_trace = self.plan.trace_strides[rung];
+            tally.trace.push(state.log as f32);
+        }
+        tally.until_trace -= 1;
+        sample(tally, self.plan, rung, state, self.space);
+    }
+
+    /// Hands the state of `rung` out for the steps it was counted in.
+    #[inline]
+    fn leave(&mut self, rung: usize) {
+        let (state, tally) = (&mut self.states[rung - 1], &mut self.tallies[rung]);
+        if state.repeats > 0 {
+            hand_out(self.space, self.plan, rung, state, tally, &mut self.accumulator, self.emit);
+        }
+    }
+
+    /// Exchanges with the rung above on even steps of the chain, with the one below on odd ones; rung 0 has its own way.
+    #[inline]
+    fn exchange_by_turns(&mut self, rung: usize, counted: bool) {
+        let turn = &mut self.steps[rung - 1].1;
+        *turn += 1;
+        if !self.plan.exchanges {
+            return;
+        }
+        if *turn % 2 == 0 {
+            if rung < self.states.len() {
+                self.exchange(rung, counted);
+            }
+        } else if rung > 1 {
+            self.exchange(rung - 1, counted);
+        }
+    }
+
+    /// Tries to exchange the states of rungs `low >= 1` and `low + 1`. A chain without a living state takes a copy of its neighbour's.
+    fn exchange(&mut self, low: usize, counted: bool) {
+        let high = low + 1;
+        let (a, b) = (&self.states[low - 1], &self.states[high - 1]);
+        if a.life != Life::Alive || b.life != Life::Alive {
+            self.revive(low, high);
+            return;
+        }
+        let there = a.values[high] * b.values[low];
+        let here = a.values[low] * b.values[high];
+        let swapped = self.random.chance() * here < there;
+        if counted {
+            self.tallies[low].attempts += 1;
+            self.tallies[low].exchanged += u64::from(swapped);
+        }
+        if swapped {
+            self.leave(low);
+            self.leave(high);
+            self.states.swap(low - 1, high - 1);
+            self.states[low - 1].settle(low);
+            self.states[high - 1].settle(high);
+        }
+    }
+
+    /// A start like a forced acceptance: it costs a path and is counted only from its own next step on.
+    #[cold]
+    fn revive(&mut self, low: usize, high: usize) {
+        for (from, to) in [(low, high), (high, low)] {
+            let (source, target) = (&self.states[from - 1], &self.states[to - 1]);
+            if source.life == Life::Alive && target.life != Life::Alive && source.values[to] > 0.0 {
+                self.proposal.replay(self.space, to, &source.coordinates, &mut self.random);
+                self.traced += 1;
+                self.take(to, false);
+                return;
+            }
+        }
+    }
+}
+
+/// Takes every n-th counted step of a rung as a sample for the allocation.
+#[inline]
+fn sample<P: LightPathSpace>(tally: &mut Tally, plan: &Plan<'_>, rung: usize, state: &State<P::Path>, space: &P) {
+    let Some(stride) = plan.sample_strides.get(rung) else { return };
+    if tally.until_sample == 0 {
+        tally.until_sample = *stride;
+        tally.samples.extend_from_slice(&state.values);
+        tally.samples.push(space.usefulness(&state.path));
+    }
+    tally.until_sample -= 1;
+}
+
+#[inline]
+fn hand_out<P: LightPathSpace, A>(
+    space: &P,
+    plan: &Plan<'_>,
+    rung: usize,
+    state: &mut State<P::Path>,
+    tally: &mut Tally,
+    accumulator: &mut A,
+    emit: &impl Fn(&mut A, &P::Path, Drawn),
+) {
+    let (weight, pilot) = plan.mixture.of(rung, &state.values);
+    let repeats = f64::from(state.repeats);
+    if let Some(cell) = space.cell(&state.path) {
+        tally.cells[cell as usize % CELLS] += state.repeats;
+    }
+    let drawn =
+        Drawn { index: state.index, stratum: rung, weight: repeats * weight, pilot_weight: repeats * pilot, repeats: state.repeats };
+    emit(accumulator, &state.path, drawn);
+    state.repeats = 0;
+}

@@ -1,0 +1,198 @@
+//! The mutation of one coordinate, and streams that mutate a stored state on demand.
+//!
+//! A coordinate is a 32-bit integer, `u = x / 2^32`; a path sees its upper 24 bits. The walk `u' = u +- xi^(1/d + 1)` modulo 1
+//! [HACHISUKA11 5] is then a wrapping addition or subtraction of an integer that does not depend on `x`, with a fair sign. That is symmetric
+//! and keeps the uniform law on the 2^32 integers *exactly*: nothing is rounded, nothing can become 1, and a coordinate lives on the same
+//! grid whether it was drawn afresh or mutated, so that exchanges with the uniform rung are exact as well. The power needs no accuracy for
+//! that; it is a polynomial approximation good to 1e-3 for exponents up to 3.
+//!
+//! A state holds the coordinates its path used, no more. The target does not depend on the rest, whose law given the used ones is uniform;
+//! so they are drawn afresh for every proposal, which is a Gibbs step and exact [KELEMEN02]. No bookkeeping of missed mutations is needed.
+
+use crate::stream::{Stream, UniformStream, unit};
+
+/// `2^32 xi^exponent`, truncated, where `xi` is made of the upper 24 of 32 random bits. An infinite exponent gives 0.
+#[inline(always)]
+fn step(bits: u32, exponent: f32) -> u32 {
+    let xi = (bits >> 8) as f32 + 0.5;
+    // log2(xi): the exponent of the float, and a cubic for its mantissa that is exact at both ends.
+    let raw = xi.to_bits();
+    let x = f32::from_bits((raw & 0x007f_ffff) | 0x3f80_0000) - 1.0;
+    let log = (raw >> 23) as f32 - (127.0 + 24.0) + x * (1.0 + (x - 1.0) * (-0.438_379_32 + x * (0.237_501_32 - x * 0.080_653_16)));
+    // 2^y likewise. Below -2 the result truncates to 0 anyway, which also catches `0 * infinity`.
+    let y = (exponent * log + 32.0).max(-2.0);
+    let floor = y.floor();
+    let f = y - floor;
+    let power = 1.0 + f + f * (1.0 - f) * (-0.304_143_16 - f * 0.079_144_97);
+    (power * f32::from_bits(((floor as i32 + 127) as u32) << 23)) as u32
+}
+
+/// The coordinate after its mutation. The lowest bit gives the sign.
+#[inline(always)]
+pub(crate) fn mutate(x: u32, bits: u32, exponent: f32) -> u32 {
+    let step = step(bits, exponent);
+    if bits & 1 == 0 { x.wrapping_add(step) } else { x.wrapping_sub(step) }
+}
+
+/// Makes coordinates as a path asks for them: mutations of a state's as far as they go, then fresh ones; and keeps what it made.
+/// One type for fresh paths (nothing to mutate), proposals and replays (infinite exponent), so that tracing is compiled once.
+pub(crate) struct Coordinates<'a> {
+    base: std::slice::Iter<'a, u32>,
+    exponent: f32,
+    random: &'a mut UniformStream,
+    made: &'a mut Vec<u32>,
+}
+
+impl<'a> Coordinates<'a> {
+    /// Mutations of `base` with the given exponent `1/d + 1`; `made` is emptied first.
+    #[inline(always)]
+    pub(crate) fn mutated(base: &'a [u32], exponent: f32, random: &'a mut UniformStream, made: &'a mut Vec<u32>) -> Self {
+        made.clear();
+        Self { base: base.iter(), exponent, random, made }
+    }
+
+    /// An independent uniform path.
+    #[inline(always)]
+    pub(crate) fn fresh(random: &'a mut UniformStream, made: &'a mut Vec<u32>) -> Self {
+        Self::mutated(&[], 1.0, random, made)
+    }
+
+    /// `base` as it is.
+    pub(crate) fn replayed(base: &'a [u32], random: &'a mut UniformStream, made: &'a mut Vec<u32>) -> Self {
+        Self::mutated(base, f32::INFINITY, random, made)
+    }
+}
+
+impl Stream for Coordinates<'_> {
+    #[inline(always)]
+    fn next_1d(&mut self) -> f32 {
+        let bits = self.random.bits();
+        let x = match self.base.next() {
+            Some(&x) => mutate(x, bits, self.exponent),
+            None => bits,
+        };
+        self.made.push(x);
+        unit(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{Key, Purpose};
+    use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
+
+    fn random(index: u64) -> UniformStream {
+        Key { seed: 8, iteration: 1, index, purpose: Purpose::Test }.stream()
+    }
+
+    /// For every pattern of random bits the one with the other sign undoes the step, from any coordinate, wrapped or not: the kernel is
+    /// symmetric bit by bit, so no rounding is hidden.
+    #[test]
+    fn every_step_has_its_inverse() {
+        let mut random = random(0);
+        for x in [0, 1, 255, 1 << 31, u32::MAX - 1, u32::MAX] {
+            for exponent in [2.0, 2.5, 11.0, 1e4] {
+                for _ in 0..20_000 {
+                    let bits = random.bits();
+                    assert_eq!(mutate(mutate(x, bits, exponent), bits ^ 1, exponent), x);
+                }
+                // The largest step there is, which is as good as exactly 1.0, and the smallest.
+                for bits in [0, 1, u32::MAX, u32::MAX - 1] {
+                    let y = mutate(x, bits, exponent);
+                    assert_eq!(mutate(y, bits ^ 1, exponent), x);
+                    assert!((0.0..1.0).contains(&unit(y)));
+                }
+            }
+        }
+    }
+
+    /// A histogram of `u' - u` as a path sees it (24 bits, as `f32`) is symmetric: of the steps in a bin and its mirror, half are positive.
+    #[test]
+    fn steps_to_both_sides_are_as_likely() {
+        const BINS: usize = 32;
+        for (k, exponent) in [2.0f32, 3.5, 21.0].into_iter().enumerate() {
+            let mut random = random(10 + k as u64);
+            let mut counts = [[0u64; 2]; BINS];
+            for _ in 0..1_000_000 {
+                let x = random.bits();
+                let mut step = unit(mutate(x, random.bits(), exponent)) - unit(x);
+                step -= step.round();
+                if step != 0.0 {
+                    let bin = ((-step.abs().log2()) * 1.3) as usize;
+                    counts[bin.min(BINS - 1)][usize::from(step > 0.0)] += 1;
+                }
+            }
+            for (bin, [left, right]) in counts.into_iter().enumerate().filter(|(_, [a, b])| a + b > 0) {
+                let p = Binomial::new(0.5, left + right).unwrap().cdf(left.min(right));
+                assert!(2.0 * p > 1e-3 / (3 * BINS) as f64, "exponent {exponent}, bin {bin}: {left} left, {right} right");
+            }
+        }
+    }
+
+    /// Uniform coordinates stay uniform after a million mutations, near the borders as well (bins are finest there).
+    #[test]
+    fn the_uniform_law_is_kept() {
+        for (k, exponent) in [2.0f32, 4.0, 101.0].into_iter().enumerate() {
+            let mut random = random(20 + k as u64);
+            let mut x = vec![0u32; 1000];
+            x.iter_mut().for_each(|x| *x = random.bits());
+            let mut counts = [0u64; 66];
+            let edges = [2e-4f32, 1.0 - 2e-4];
+            for round in 0..1000 {
+                for x in &mut x {
+                    *x = mutate(*x, random.bits(), exponent);
+                }
+                // Thinned: neighbouring rounds are not independent, and the small exponent forgets in ten.
+                if round % 100 == 99 && exponent < 50.0 || round == 999 {
+                    for u in x.iter().map(|x| unit(*x)) {
+                        counts[if u < edges[0] {
+                            64
+                        } else if u >= edges[1] {
+                            65
+                        } else {
+                            (u * 64.0) as usize
+                        }] += 1;
+                    }
+                }
+            }
+            let n = counts.iter().sum::<u64>() as f64;
+            let expected = |bin: usize| n * if bin >= 64 { 2e-4 } else { 1.0 / 64.0 - if bin % 63 == 0 { 2e-4 } else { 0.0 } };
+            // The two finest bins are joined: their expectation is small.
+            let mut terms: Vec<(f64, f64)> = (0..64).map(|bin| (counts[bin] as f64, expected(bin))).collect();
+            terms.push(((counts[64] + counts[65]) as f64, 2.0 * expected(64)));
+            let chi2: f64 = terms.iter().map(|(c, e)| (c - e).powi(2) / e).sum();
+            let p = ChiSquared::new(64.0).unwrap().sf(chi2);
+            assert!(p > 1e-3 / 3.0, "exponent {exponent}: chi2 {chi2}, p {p}");
+        }
+    }
+
+    /// The approximated power is the power: 1e-3 relative where the result has that many digits.
+    #[test]
+    fn the_step_is_the_power_it_stands_for() {
+        for exponent in [1.5f32, 2.0, 3.0] {
+            for bits in (0..u32::MAX).step_by(65_537) {
+                let xi = (f64::from(bits >> 8) + 0.5) / 16_777_216.0;
+                let exact = xi.powf(f64::from(exponent)) * 4_294_967_296.0;
+                assert!(
+                    (f64::from(step(bits, exponent)) - exact).abs() <= 1e-3 * exact + 1.0,
+                    "{bits}: {} for {exact}",
+                    step(bits, exponent)
+                );
+            }
+        }
+        assert!((0..u32::MAX).step_by(9973).all(|bits| step(bits, f32::INFINITY) == 0));
+    }
+
+    #[test]
+    fn a_replay_repeats_and_what_is_beyond_a_state_is_fresh() {
+        let (mut a, mut b) = (random(30), random(31));
+        let base: Vec<u32> = (0..5).map(|_| a.bits()).collect();
+        let mut made = Vec::new();
+        let mut replay = Coordinates::replayed(&base, &mut b, &mut made);
+        let played: Vec<f32> = (0..7).map(|_| replay.next_1d()).collect();
+        assert_eq!(made[..5], base);
+        assert_eq!(played, made.iter().map(|x| unit(*x)).collect::<Vec<f32>>());
+        assert_eq!(made.len(), 7);
+    }
+}

@@ -1,0 +1,85 @@
+//! A chain's state: while it runs, and between draws.
+
+use crate::adapt::StepSize;
+use crate::mutation::Coordinates;
+use crate::sampler::LightPathSpace;
+use crate::stream::UniformStream;
+use serde::{Deserialize, Serialize};
+
+/// What a chain stands on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Life {
+    /// Nothing has ever been found.
+    #[default]
+    Empty,
+    /// A state whose target became 0 when the targets changed: a start for mutations, counted nowhere.
+    Dead,
+    /// A state with a positive target.
+    Alive,
+}
+
+/// A chain between draws.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Chain {
+    pub(crate) coordinates: Vec<u32>,
+    pub(crate) life: Life,
+    /// The state has been on the last rung since it came from rung 0.
+    pub(crate) climbed: bool,
+    pub(crate) step: StepSize,
+    /// Own steps so far: whose turn it is to exchange.
+    pub(crate) turn: u64,
+}
+
+/// A state with its path and its targets' values. Exchanged between chains as a whole.
+pub(crate) struct State<T> {
+    pub(crate) coordinates: Vec<u32>,
+    pub(crate) path: T,
+    /// All rungs' targets.
+    pub(crate) values: Vec<f64>,
+    pub(crate) life: Life,
+    pub(crate) climbed: bool,
+    /// Counted steps since the state was last handed out.
+    pub(crate) repeats: u32,
+    /// Number of the first of them within the iteration.
+    pub(crate) index: u64,
+    /// Target of the next rung over that of the chain's own.
+    pub(crate) ratio: f64,
+    /// Logarithm of the last rung's target; that of the smallest normal number for 0.
+    pub(crate) log: f64,
+}
+
+/// Room for coordinates from the start: more than most paths use.
+const COORDINATES: usize = 128;
+
+impl<T: Default> State<T> {
+    pub(crate) fn new(rungs: usize) -> Self {
+        Self {
+            coordinates: Vec::with_capacity(COORDINATES),
+            path: T::default(),
+            values: vec![0.0; rungs],
+            life: Life::Empty,
+            climbed: false,
+            repeats: 0,
+            index: 0,
+            ratio: 0.0,
+            log: 0.0,
+        }
+    }
+
+    /// The stored state under the present targets.
+    pub(crate) fn replay<P: LightPathSpace<Path = T>>(&mut self, space: &P, rung: usize, base: &[u32], random: &mut UniformStream) {
+        space.trace(&mut Coordinates::replayed(base, random, &mut self.coordinates), &mut self.path);
+        space.targets(&self.path, &mut self.values);
+        self.life = if self.values[rung] > 0.0 { Life::Alive } else { Life::Dead };
+    }
+
+    /// Brings the numbers up to date that belong to the state *at this rung*.
+    #[inline]
+    pub(crate) fn settle(&mut self, rung: usize) {
+        let last = self.values.len() - 1;
+        self.ratio = if rung < last && self.values[rung] > 0.0 { self.values[rung + 1] / self.values[rung] } else { 0.0 };
+        self.log = self.values[last].max(f64::MIN_POSITIVE).ln();
+        self.climbed |= rung == last;
+    }
+}
