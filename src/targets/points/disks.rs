@@ -1,6 +1,7 @@
 //! Balls of many sizes, found by a point inside them.
 
 use glam::{IVec3, Vec3};
+use wide::f32x8;
 
 /// What decides whether a light vertex inside a ball counts.
 #[derive(Clone, Copy, Debug)]
@@ -13,12 +14,42 @@ pub(super) struct Disk {
     pub(super) depth: u32,
 }
 
-/// A ball in the list of a bucket.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    p: Vec3,
-    radius2: f32,
-    index: u32,
+/// Balls of the buckets' lists, component by component, so that eight are tested at once.
+#[derive(Debug, Default)]
+struct Entries {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    radius2: Vec<f32>,
+    index: Vec<u32>,
+}
+
+/// Balls tested at once.
+const LANES: usize = 8;
+
+impl Entries {
+    /// `count` balls that hold no point, and as many more as a test of the last one reads.
+    fn new(count: usize) -> Self {
+        let blank = || vec![0.0; count + LANES];
+        Self { x: blank(), y: blank(), z: blank(), radius2: blank(), index: vec![0; count] }
+    }
+
+    fn set(&mut self, place: usize, p: Vec3, radius: f32, index: u32) {
+        (self.x[place], self.y[place], self.z[place]) = (p.x, p.y, p.z);
+        (self.radius2[place], self.index[place]) = (radius * radius, index);
+    }
+
+    /// A bit for each of the eight balls from `first` on that hold the point.
+    #[inline(always)]
+    fn holding(&self, first: usize, p: [f32x8; 3]) -> u32 {
+        let load = |list: &[f32]| {
+            let mut lanes = [0.0; LANES];
+            lanes.copy_from_slice(&list[first..first + LANES]);
+            f32x8::new(lanes)
+        };
+        let (x, y, z) = (load(&self.x) - p[0], load(&self.y) - p[1], load(&self.z) - p[2]);
+        (x * x + y * y + z * z).simd_lt(load(&self.radius2)).to_bitmask()
+    }
 }
 
 /// Levels of cells, each twice as wide as the one below; their set fits a word.
@@ -32,7 +63,7 @@ pub(super) struct DiskGrid {
     inverse_cells: Vec<f32>,
     /// Bucket `b` holds `entries[starts[b]..starts[b + 1]]`.
     starts: Vec<u32>,
-    entries: Vec<Entry>,
+    entries: Entries,
     /// Levels present in each bucket of the widest cells.
     present: Vec<u32>,
 }
@@ -63,12 +94,12 @@ impl DiskGrid {
             *start = sum;
         }
         let mut next = starts.clone();
-        let mut entries = vec![Entry { p: Vec3::ZERO, radius2: 0.0, index: 0 }; sum as usize];
+        let mut entries = Entries::new(sum as usize);
         for (index, (p, r)) in balls.enumerate() {
             let level = level_of(r);
             cells(p, r, inverse_cells[level as usize], level, mask, |bucket| {
                 let place = &mut next[bucket as usize];
-                entries[*place as usize] = Entry { p, radius2: r * r, index: index as u32 };
+                entries.set(*place as usize, p, r, index as u32);
                 *place += 1;
             });
         }
@@ -80,15 +111,22 @@ impl DiskGrid {
     pub(super) fn containing(&self, p: Vec3, mut visit: impl FnMut(u32)) {
         let Some(&widest) = self.inverse_cells.first() else { return };
         let mut levels = self.present[bucket(cell_of(p, widest), LEVELS, self.present.len() as u32 - 1) as usize];
+        let splat = [p.x, p.y, p.z].map(f32x8::splat);
         while levels != 0 {
             let level = levels.trailing_zeros();
             levels &= levels - 1;
             let cell = cell_of(p, self.inverse_cells[level as usize]);
             let bucket = bucket(cell, level, self.starts.len() as u32 - 2) as usize;
-            for entry in &self.entries[self.starts[bucket] as usize..self.starts[bucket + 1] as usize] {
-                if entry.p.distance_squared(p) < entry.radius2 {
-                    visit(entry.index);
+            let (mut first, end) = (self.starts[bucket] as usize, self.starts[bucket + 1] as usize);
+            while first < end {
+                let mut held = self.entries.holding(first, splat);
+                // What lies beyond the list is another bucket's.
+                held &= u32::MAX >> (u32::BITS - (end - first).min(LANES) as u32);
+                while held != 0 {
+                    visit(self.entries.index[first + held.trailing_zeros() as usize]);
+                    held &= held - 1;
                 }
+                first += LANES;
             }
         }
     }
