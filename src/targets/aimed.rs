@@ -2,7 +2,7 @@
 
 use super::aim::{Aim, Rung};
 use super::light_paths::{LightPath, LightPaths};
-use super::points::{Points, Touch};
+use super::points::{Points, Search, Touch};
 use crate::samplers::{CELLS, LightPathSpace, Stream};
 
 /// A light path and the measurement points it reaches.
@@ -16,6 +16,7 @@ pub struct AimedPath {
     best: Aim,
     /// Sum of squared full targets over the pairs.
     usefulness: f64,
+    search: Search,
 }
 
 /// All light subpaths of a scene, aimed at an iteration's measurement points.
@@ -23,10 +24,8 @@ pub struct AimedPath {
 pub struct AimedPaths<'a> {
     /// The paths.
     pub light: LightPaths<'a>,
-    /// What they should reach.
+    /// What they should reach, with targets.
     pub points: &'a Points<'a>,
-    /// Targets at the points.
-    pub aims: &'a [Aim],
     /// The ladder, uniform first.
     pub rungs: &'a [Rung],
 }
@@ -35,19 +34,16 @@ impl LightPathSpace for AimedPaths<'_> {
     type Path = AimedPath;
 
     fn trace<S: Stream>(&self, stream: &mut S, path: &mut AimedPath) {
-        let AimedPath { light, touches, best, usefulness } = path;
+        let AimedPath { light, touches, best, usefulness, search } = path;
         self.light.trace(stream, light);
-        touches.clear();
+        self.points.touched(&light.vertices, search, touches);
         *best = Aim::default();
         *usefulness = 0.0;
-        for (number, vertex) in (0u32..).zip(&light.vertices) {
-            self.points.touched(vertex, |point| {
-                let aim = self.aims[point as usize];
-                best.kernel = best.kernel.max(aim.kernel);
-                best.full = best.full.max(aim.full);
-                *usefulness += f64::from(aim.full) * f64::from(aim.full);
-                touches.push(Touch { vertex: number, point });
-            });
+        for touch in touches {
+            let aim = self.points.aim(touch.point);
+            best.kernel = best.kernel.max(aim.kernel);
+            best.full = best.full.max(aim.full);
+            *usefulness += f64::from(aim.full) * f64::from(aim.full);
         }
     }
 

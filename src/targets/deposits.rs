@@ -1,6 +1,5 @@
 //! What light paths leave at measurement points and in regions, summed in one order whatever the number of threads.
 
-use super::aim::Aim;
 use super::aimed::AimedPath;
 use super::points::Points;
 use super::regions::Half;
@@ -46,8 +45,9 @@ impl Deposits {
     }
 
     /// Takes a path as the sampler hands it out.
-    pub fn add(&mut self, points: &Points<'_>, aims: &[Aim], path: &AimedPath, drawn: Drawn) {
+    pub fn add(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
         if drawn.weight > 0.0 {
+            path.touches.iter().for_each(|touch| points.fetch(touch.point));
             for touch in &path.touches {
                 let value = points.value(touch.point, &path.light.vertices[touch.vertex as usize]) * drawn.weight as f32;
                 let value = self.tally.finite(value);
@@ -56,21 +56,21 @@ impl Deposits {
             }
         }
         if drawn.pilot_weight > 0.0 && !self.paths.is_empty() {
-            self.learn(aims, path, drawn);
+            self.learn(points, path, drawn);
         }
     }
 
     /// A path counts once a point, however many of its vertices lie there: `P_k` is a probability (theory B.5).
-    fn learn(&mut self, aims: &[Aim], path: &AimedPath, drawn: Drawn) {
+    fn learn(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
         let psi = &mut self.psi[drawn.stratum];
         for (i, touch) in path.touches.iter().enumerate() {
             let before = &path.touches[..i];
             if before.iter().any(|earlier| earlier.point == touch.point) {
                 continue;
             }
-            let leaf = aims[touch.point as usize].leaf;
+            let leaf = points.aim(touch.point).leaf;
             psi[leaf as usize] += drawn.pilot_weight;
-            if !before.iter().any(|earlier| aims[earlier.point as usize].leaf == leaf) {
+            if !before.iter().any(|earlier| points.aim(earlier.point).leaf == leaf) {
                 self.paths[leaf as usize] += 1.0;
             }
         }

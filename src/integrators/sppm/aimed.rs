@@ -52,17 +52,18 @@ impl Aimed {
 
     /// An iteration: camera subpaths first, then light paths aimed at what they found.
     pub(super) fn iterate(&mut self, sppm: &Sppm<'_>, i: u64, film: &mut Film, stats: &mut IterationStats) -> Glossy {
-        let (mut values, points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
+        let (mut values, mut points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
         let aims = self.aimer.aim(&points, self.place(&sppm.eye), shrink(i, sppm.settings.alpha));
+        points.set_aims(aims.iter().copied());
         let light = sppm.light_paths();
-        let space = AimedPaths { light, points: &points, aims: &aims, rungs: &self.rungs };
+        let space = AimedPaths { light, points: &points, rungs: &self.rungs };
         let leaves = self.aimer.regions.as_ref().map_or(0, Regions::leaves);
         let (count, strata) = (points.all().len(), self.ladder.strata());
         let start = || Deposits::new(count, strata, leaves);
         let paths = if light.max_depth == 0 { 0 } else { sppm.photon_count };
-        let draw = self.ladder.draw(&space, i, paths, start, |deposits, path, drawn| deposits.add(&points, &aims, path, drawn));
+        let draw = self.ladder.draw(&space, i, paths, start, |deposits, path, drawn| deposits.add(&points, path, drawn));
         stats.light_paths += draw.traced;
         draw.batches.iter().for_each(|deposits| stats.count(&deposits.tally));
         let (sums, halves) = collect(&draw, count);

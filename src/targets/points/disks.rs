@@ -1,54 +1,29 @@
-//! Balls of many sizes, found by a point inside them.
+//! Balls of many sizes, found by the points inside them.
 
+use crate::math::fetch;
 use glam::{IVec3, Vec3};
 use wide::f32x8;
 
-/// What decides whether a light vertex inside a ball counts.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Disk {
-    /// Unit geometric normal.
-    pub(super) n_g: Vec3,
-    /// Unit shading normal.
-    pub(super) n_s: Vec3,
-    /// Camera edges.
-    pub(super) depth: u32,
-}
-
-/// Balls of the buckets' lists, component by component, so that eight are tested at once.
-#[derive(Debug, Default)]
-struct Entries {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    z: Vec<f32>,
-    radius2: Vec<f32>,
-    index: Vec<u32>,
+/// Eight balls of a bucket's list, component by component. A place that is not taken holds no point.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+struct Group {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    z: [f32; LANES],
+    radius2: [f32; LANES],
+    index: [u32; LANES],
 }
 
 /// Balls tested at once.
 const LANES: usize = 8;
 
-impl Entries {
-    /// `count` balls that hold no point, and as many more as a test of the last one reads.
-    fn new(count: usize) -> Self {
-        let blank = || vec![0.0; count + LANES];
-        Self { x: blank(), y: blank(), z: blank(), radius2: blank(), index: vec![0; count] }
-    }
-
-    fn set(&mut self, place: usize, p: Vec3, radius: f32, index: u32) {
-        (self.x[place], self.y[place], self.z[place]) = (p.x, p.y, p.z);
-        (self.radius2[place], self.index[place]) = (radius * radius, index);
-    }
-
-    /// A bit for each of the eight balls from `first` on that hold the point.
+impl Group {
+    /// A bit for each ball that holds the point.
     #[inline(always)]
-    fn holding(&self, first: usize, p: [f32x8; 3]) -> u32 {
-        let load = |list: &[f32]| {
-            let mut lanes = [0.0; LANES];
-            lanes.copy_from_slice(&list[first..first + LANES]);
-            f32x8::new(lanes)
-        };
-        let (x, y, z) = (load(&self.x) - p[0], load(&self.y) - p[1], load(&self.z) - p[2]);
-        (x * x + y * y + z * z).simd_lt(load(&self.radius2)).to_bitmask()
+    fn holding(&self, p: [f32x8; 3]) -> u32 {
+        let (x, y, z) = (f32x8::new(self.x) - p[0], f32x8::new(self.y) - p[1], f32x8::new(self.z) - p[2]);
+        (x * x + y * y + z * z).simd_lt(f32x8::new(self.radius2)).to_bitmask()
     }
 }
 
@@ -61,9 +36,9 @@ const LEVELS: u32 = 24;
 pub(super) struct DiskGrid {
     /// Widest cell first: reciprocal of the side at each level.
     inverse_cells: Vec<f32>,
-    /// Bucket `b` holds `entries[starts[b]..starts[b + 1]]`.
+    /// Bucket `b` holds `groups[starts[b]..starts[b + 1]]`.
     starts: Vec<u32>,
-    entries: Entries,
+    groups: Vec<Group>,
     /// Levels present in each bucket of the widest cells.
     present: Vec<u32>,
 }
@@ -88,48 +63,84 @@ impl DiskGrid {
             cells(p, r, inverse_cells[level as usize], level, mask, |bucket| starts[bucket as usize + 1] += 1);
             cells(p, r, inverse_cells[0], LEVELS, coarse_mask, |bucket| present[bucket as usize] |= 1 << level);
         }
+        // From balls a bucket to the first group of each.
         let mut sum = 0;
         for start in &mut starts {
-            sum += *start;
+            sum += start.div_ceil(LANES as u32);
             *start = sum;
         }
-        let mut next = starts.clone();
-        let mut entries = Entries::new(sum as usize);
+        let mut taken = vec![0u32; buckets];
+        let mut groups = vec![Group::default(); sum as usize];
         for (index, (p, r)) in balls.enumerate() {
             let level = level_of(r);
             cells(p, r, inverse_cells[level as usize], level, mask, |bucket| {
-                let place = &mut next[bucket as usize];
-                entries.set(*place as usize, p, r, index as u32);
-                *place += 1;
+                let place = taken[bucket as usize] as usize;
+                taken[bucket as usize] += 1;
+                let (group, lane) = (&mut groups[starts[bucket as usize] as usize + place / LANES], place % LANES);
+                (group.x[lane], group.y[lane], group.z[lane]) = (p.x, p.y, p.z);
+                (group.radius2[lane], group.index[lane]) = (r * r, index as u32);
             });
         }
-        Self { inverse_cells, starts, entries, present }
+        Self { inverse_cells, starts, groups, present }
     }
 
-    /// Calls `visit` with the number of every ball that holds `p`, each once.
+    /// Calls `visit` with the number of a place and of a ball that holds it, for all of them, places in order. `scratch` is memory.
+    ///
+    /// All places are looked up together, step by step, each step asking for what the next one reads: a look-up is three waits for memory.
     #[inline]
-    pub(super) fn containing(&self, p: Vec3, mut visit: impl FnMut(u32)) {
+    pub(super) fn containing(
+        &self,
+        places: impl Iterator<Item = Vec3> + Clone,
+        scratch: &mut Vec<Lookup>,
+        mut visit: impl FnMut(u32, u32),
+    ) {
         let Some(&widest) = self.inverse_cells.first() else { return };
-        let mut levels = self.present[bucket(cell_of(p, widest), LEVELS, self.present.len() as u32 - 1) as usize];
-        let splat = [p.x, p.y, p.z].map(f32x8::splat);
-        while levels != 0 {
-            let level = levels.trailing_zeros();
-            levels &= levels - 1;
-            let cell = cell_of(p, self.inverse_cells[level as usize]);
-            let bucket = bucket(cell, level, self.starts.len() as u32 - 2) as usize;
-            let (mut first, end) = (self.starts[bucket] as usize, self.starts[bucket + 1] as usize);
-            while first < end {
-                let mut held = self.entries.holding(first, splat);
-                // What lies beyond the list is another bucket's.
-                held &= u32::MAX >> (u32::BITS - (end - first).min(LANES) as u32);
+        let coarse_mask = self.present.len() as u32 - 1;
+        scratch.clear();
+        for (place, p) in (0u32..).zip(places.clone()) {
+            let bucket = bucket(cell_of(p, widest), LEVELS, coarse_mask);
+            fetch(&self.present[bucket as usize]);
+            scratch.push(Lookup { place, p, bucket });
+        }
+        let count = scratch.len();
+        for i in 0..count {
+            let Lookup { place, p, bucket: coarse } = scratch[i];
+            let mut levels = self.present[coarse as usize];
+            while levels != 0 {
+                let level = levels.trailing_zeros();
+                levels &= levels - 1;
+                let bucket = bucket(cell_of(p, self.inverse_cells[level as usize]), level, self.starts.len() as u32 - 2);
+                fetch(&self.starts[bucket as usize]);
+                scratch.push(Lookup { place, p, bucket });
+            }
+        }
+        for lookup in &scratch[count..] {
+            if let Some(group) = self.groups.get(self.starts[lookup.bucket as usize] as usize) {
+                // A group lies in three cache lines.
+                fetch(&group.x);
+                fetch(&group.z);
+                fetch(&group.index);
+            }
+        }
+        for &Lookup { place, p, bucket } in &scratch[count..] {
+            let splat = [p.x, p.y, p.z].map(f32x8::splat);
+            for group in &self.groups[self.starts[bucket as usize] as usize..self.starts[bucket as usize + 1] as usize] {
+                let mut held = group.holding(splat);
                 while held != 0 {
-                    visit(self.entries.index[first + held.trailing_zeros() as usize]);
+                    visit(place, group.index[held.trailing_zeros() as usize]);
                     held &= held - 1;
                 }
-                first += LANES;
             }
         }
     }
+}
+
+/// A list to be read for a place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lookup {
+    place: u32,
+    p: Vec3,
+    bucket: u32,
 }
 
 /// Calls `visit` with the bucket of every cell that the ball meets, each bucket once: a ball must not stand twice in a list.
@@ -180,12 +191,15 @@ mod tests {
         for (scale, spread) in [(1.0f32, 0.0f32), (1e3, 4.0), (1e-3, 21.0)] {
             let balls: Vec<(Vec3, f32)> = (0..3000).map(|i| (point(scale), 0.05 * scale * (-spread * (i as f32 / 3000.0)).exp())).collect();
             let grid = DiskGrid::build(balls.iter().copied());
-            let mut found_any = 0;
+            let (mut found_any, mut scratch) = (0, Vec::new());
             for i in 0..2000 {
                 // Near the balls' centres too, or the small ones are never met.
                 let p = if i % 2 == 0 { point(scale) } else { balls[i].0 + point(1.0) * balls[i].1 };
                 let mut found = Vec::new();
-                grid.containing(p, |index| found.push(index));
+                // Two places at once, one far away.
+                grid.containing([Vec3::splat(1e4), p].into_iter(), &mut scratch, |place, index| found.push((place, index)));
+                assert!(found.iter().all(|(place, _)| *place == 1));
+                let mut found: Vec<u32> = found.into_iter().map(|(_, index)| index).collect();
                 found.sort_unstable();
                 let expected: Vec<u32> = (0u32..).zip(&balls).filter(|(_, (c, r))| c.distance_squared(p) < r * r).map(|(i, _)| i).collect();
                 found_any += expected.len();
@@ -197,6 +211,7 @@ mod tests {
 
     #[test]
     fn an_empty_grid_answers_nothing() {
-        DiskGrid::build(std::iter::empty::<(Vec3, f32)>()).containing(Vec3::ZERO, |_| panic!("found something"));
+        let grid = DiskGrid::build(std::iter::empty::<(Vec3, f32)>());
+        grid.containing(std::iter::once(Vec3::ZERO), &mut Vec::new(), |_, _| panic!("found something"));
     }
 }
