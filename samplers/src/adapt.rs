@@ -46,7 +46,7 @@ impl StepSize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mutation::mutate;
+    use crate::mutation::mutate_all;
     use crate::stream::{Key, Purpose};
 
     /// Chain on a Gaussian bump of the given width at 0.5 in `dimensions` coordinates: the step size and the acceptance of its second half.
@@ -59,9 +59,7 @@ mod tests {
         let mut late = 0u32;
         const STEPS: u32 = 400_000;
         for i in 0..STEPS {
-            for (y, x) in y.iter_mut().zip(&x) {
-                *y = mutate(*x, random.bits(), step.exponent());
-            }
+            mutate_all(&x, step.exponent(), &mut random, &mut y);
             let accepted = random.chance() < (log(&y) - log(&x)).exp();
             if accepted {
                 std::mem::swap(&mut x, &mut y);

@@ -10,7 +10,7 @@ use super::schedule::Schedule;
 use super::weights::Mixture;
 use crate::adapt::StepSize;
 use crate::diagnostics::blocks::{BLOCKS, Blocks};
-use crate::mutation::Coordinates;
+use crate::mutation::mutate_all;
 use crate::sampler::{CELLS, Drawn, LightPathSpace};
 use crate::state::{Chain, Life, State};
 use crate::stream::{Key, Purpose, UniformStream};
@@ -165,14 +165,13 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
     /// Traces the proposal: a mutation of the state of `rung`, or an independent path.
     #[inline]
     fn propose(&mut self, rung: usize, mutate: bool, counted: bool) {
-        let mut stream = if mutate {
-            let exponent = self.steps[rung - 1].0.exponent();
-            Coordinates::mutated(&self.states[rung - 1].coordinates, exponent, &mut self.random, &mut self.proposal.coordinates)
+        let made = &mut self.proposal.coordinates;
+        if mutate {
+            mutate_all(&self.states[rung - 1].coordinates, self.steps[rung - 1].0.exponent(), &mut self.random, made);
         } else {
-            Coordinates::fresh(&mut self.random, &mut self.proposal.coordinates)
-        };
-        self.space.trace(&mut stream, &mut self.proposal.path);
-        self.space.targets(&self.proposal.path, &mut self.proposal.values);
+            made.clear();
+        }
+        self.proposal.trace(self.space, &mut self.random);
         self.traced += 1;
         if counted {
             self.tallies[rung].proposals += 1;
@@ -288,7 +287,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         if !self.plan.exchanges {
             return;
         }
-        if *turn % 2 == 0 {
+        if turn.is_multiple_of(2) {
             if rung < self.states.len() {
                 self.exchange(rung, counted);
             }

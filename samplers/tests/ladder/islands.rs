@@ -96,7 +96,7 @@ fn occupancy(islands: &Islands, rung: usize, chains: &[Vec<u8>]) -> f64 {
 fn every_rung_visits_cells_by_its_law_and_normalisations_are_right() {
     let islands = Islands::new();
     let mut ladder = Ladder::new(settings(1, 4));
-    let series = series(&islands, &mut ladder, 2_400_000);
+    let series = series(&islands, &mut ladder, 6_000_000);
     for rung in 1..4 {
         let p = occupancy(&islands, rung, &series[rung]);
         assert!(p > FAMILY / 3.0, "rung {rung}: p = {p:.2e}");
