@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// coordinate, and nothing larger is worth having; at the lower one hardly a proposal leaves its 2^-32.
 pub(crate) const BOUNDS: (f64, f64) = (1e-4, 1.0);
 
-/// The step size of one chain. After its `n`-th mutation `d += (accepted/n - wanted)/n` [HACHISUKA11 5.2]: the gain dies out as 1/n,
+/// The step size of one chain. After its `n`-th mutation `d += (accepted/n - wanted)/n` \[HACHISUKA11\]: the gain dies out as 1/n,
 /// over draws as well, so that the chain keeps its law in the limit (diminishing adaptation).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StepSize {

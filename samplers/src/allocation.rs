@@ -12,7 +12,7 @@
 //! `V(new) <= sum_c s_c^2 G_c / new_c`, `G_c = integral h g_c/q^2`, with equality at the old shares. The right side is least at
 //! `new_c ~ s_c sqrt(G_c)`, or at its floor where that is larger, and so V falls at every update; at a fixed point every free rung has the
 //! same gain `G_c`, which is the condition of Karush, Kuhn and Tucker. The integral is a sum over sampled paths. This is the multiplicative
-//! algorithm of optimal design with exponent 1/2 [YU10].
+//! algorithm of optimal design with exponent 1/2 \[YU10\].
 //!
 //! Floors keep every rung alive: rung 0 is the only one that finds light no chain has met, and a rung without steps has no normalisation.
 

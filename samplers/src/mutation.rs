@@ -1,13 +1,13 @@
 //! The mutation of one coordinate, and streams that mutate a stored state on demand.
 //!
 //! A coordinate is a 32-bit integer, `u = x / 2^32`; a path sees its upper 24 bits. The walk `u' = u +- xi^(1/d + 1)` modulo 1
-//! [HACHISUKA11 5] is then a wrapping addition or subtraction of an integer that does not depend on `x`, with a fair sign. That is symmetric
+//! \[HACHISUKA11\] is then a wrapping addition or subtraction of an integer that does not depend on `x`, with a fair sign. That is symmetric
 //! and keeps the uniform law on the 2^32 integers *exactly*: nothing is rounded, nothing can become 1, and a coordinate lives on the same
 //! grid whether it was drawn afresh or mutated, so that exchanges with the uniform rung are exact as well. The power needs no accuracy for
 //! that; it is a polynomial approximation good to 1e-3 for exponents up to 3.
 //!
 //! A state holds the coordinates its path used, no more. The target does not depend on the rest, whose law given the used ones is uniform;
-//! so they are drawn afresh for every proposal, which is a Gibbs step and exact [KELEMEN02]. No bookkeeping of missed mutations is needed.
+//! so they are drawn afresh for every proposal, which is a Gibbs step and exact \[KELEMEN02\]. No bookkeeping of missed mutations is needed.
 
 use crate::stream::{Stream, UniformStream, unit};
 
@@ -25,7 +25,7 @@ fn step(bits: u32, exponent: f32) -> u32 {
     let y = if y > -2.0 { y } else { -2.0 };
     let shifted = y + ROUNDING;
     let f = y - (shifted - ROUNDING);
-    let power = 0.999_928_95 + f * (0.693_276_24 + f * (0.242_604_05 + f * 0.055_088_684));
+    let power = 0.999_928_95 + f * (0.693_276_2 + f * (0.242_604_05 + f * 0.055_088_684));
     let scale = f32::from_bits((shifted.to_bits().wrapping_sub(ROUNDING.to_bits()).wrapping_add(127)) << 23);
     ((power * scale) as i32 as u32) << 1 | (bits >> 1 & 1)
 }

@@ -1,9 +1,9 @@
 //! One ensemble of a draw: a chain a rung, run by one thread from start to end.
 //!
-//! A step of rung c mutates its state and accepts with `min(1, T_c(y)/T_c(x))` [KELEMEN02]; the state *after* it is counted; then the chain
-//! tries an exchange with one neighbour, accepted with `min(1, T_a(x_b) T_b(x_a) / (T_a(x_a) T_b(x_b)))` [STF 4.3]. A step of rung 0 is an
+//! A step of rung c mutates its state and accepts with `min(1, T_c(y)/T_c(x))` \[KELEMEN02\]; the state *after* it is counted; then the chain
+//! tries an exchange with one neighbour, accepted with `min(1, T_a(x_b) T_b(x_a) / (T_a(x_a) T_b(x_b)))` \[STF\]. A step of rung 0 is an
 //! independent path `u`, which rung 1 takes with `min(1, T_1(u)/T_1(x_1))`: its old state would go to rung 0, whose next path is independent
-//! of it, so it is dropped [HACHISUKA11 4]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
+//! of it, so it is dropped \[HACHISUKA11\]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
 //! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
 
 use super::schedule::Schedule;
