@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// coordinate, and nothing larger is worth having; at the lower one hardly a proposal leaves its 2^-32.
 pub(crate) const BOUNDS: (f64, f64) = (1e-4, 1.0);
 
-/// The step size of one chain. After its `n`-th mutation `d += (accepted/n - wanted)/n` [HACHISUKA11 5.2]: the gain dies out as 1/n,
+/// The step size of one chain. After its `n`-th mutation `d += (accepted/n - wanted)/n` \[HACHISUKA11\]: the gain dies out as 1/n,
 /// over draws as well, so that the chain keeps its law in the limit (diminishing adaptation).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct StepSize {
@@ -46,7 +46,7 @@ impl StepSize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mutation::mutate;
+    use crate::mutation::mutate_all;
     use crate::stream::{Key, Purpose};
 
     /// Chain on a Gaussian bump of the given width at 0.5 in `dimensions` coordinates: the step size and the acceptance of its second half.
@@ -59,9 +59,7 @@ mod tests {
         let mut late = 0u32;
         const STEPS: u32 = 400_000;
         for i in 0..STEPS {
-            for (y, x) in y.iter_mut().zip(&x) {
-                *y = mutate(*x, random.bits(), step.exponent());
-            }
+            mutate_all(&x, step.exponent(), &mut random, &mut y);
             let accepted = random.chance() < (log(&y) - log(&x)).exp();
             if accepted {
                 std::mem::swap(&mut x, &mut y);

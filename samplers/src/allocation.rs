@@ -12,7 +12,7 @@
 //! `V(new) <= sum_c s_c^2 G_c / new_c`, `G_c = integral h g_c/q^2`, with equality at the old shares. The right side is least at
 //! `new_c ~ s_c sqrt(G_c)`, or at its floor where that is larger, and so V falls at every update; at a fixed point every free rung has the
 //! same gain `G_c`, which is the condition of Karush, Kuhn and Tucker. The integral is a sum over sampled paths. This is the multiplicative
-//! algorithm of optimal design with exponent 1/2 [YU10].
+//! algorithm of optimal design with exponent 1/2 \[YU10\].
 //!
 //! Floors keep every rung alive: rung 0 is the only one that finds light no chain has met, and a rung without steps has no normalisation.
 
@@ -68,12 +68,14 @@ impl Problem {
         value
     }
 
-    /// Shares of the cost that minimise `V`, none below its floor. `None` if no path is any use.
+    /// Shares of the cost that minimise `V`, none below its floor. `None` if no path is any use. Updates begin with all that floors leave on
+    /// rung 0, and rungs with equal densities keep their proportion: of equally good shares it is the one with most independent paths.
     pub(crate) fn solve(&self, floors: &[f64]) -> Option<Vec<f64>> {
         if self.useful.is_empty() {
             return None;
         }
-        let mut shares = vec![1.0 / self.rungs as f64; self.rungs];
+        let mut shares = floors.to_vec();
+        shares[0] = 1.0 - floors[1..].iter().sum::<f64>();
         let mut gains = vec![0.0; self.rungs];
         for _ in 0..UPDATES {
             self.value(&shares, &mut gains);
@@ -183,6 +185,14 @@ mod tests {
                 assert!(gains[c] <= most && (!free || gains[c] > 0.99 * most), "problem {index}: {gains:?} at {shares:?}");
             }
         }
+    }
+
+    #[test]
+    fn of_equals_the_independent_rung_is_taken() {
+        let mut problem = Problem::new(3);
+        problem.push([1.0, 1.0, 0.9].into_iter(), 1.0);
+        let shares = problem.solve(&floors(3)).unwrap();
+        assert!(shares[0] > 0.95, "{shares:?}");
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //!
 //! Rung 0 draws independent paths; rung c is a chain with the law `T_c/b_c`; neighbours exchange states (module `ensemble`). A draw runs
 //! `ensembles` such groups side by side, joins their paths by fixed weights (`weights`), and estimates the normalisations (`normalisation`)
-//! that only its end knows and [`Draw::scales`] carries. A ladder with two rungs is visibility-driven photon tracing [HACHISUKA11], one with
-//! four the spatial target function [STF].
+//! that only its end knows and [`Draw::scales`] carries. A ladder with two rungs is visibility-driven photon tracing \[HACHISUKA11\], one with
+//! four the spatial target function \[STF\].
 
 mod ensemble;
 mod normalisation;

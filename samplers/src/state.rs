@@ -67,10 +67,20 @@ impl<T: Default> State<T> {
         }
     }
 
+    /// Traces what the coordinates describe and keeps the used ones; evaluates all targets.
+    #[inline(always)]
+    pub(crate) fn trace<P: LightPathSpace<Path = T>>(&mut self, space: &P, random: &mut UniformStream) {
+        let mut stream = Coordinates::after(random, &mut self.coordinates);
+        space.trace(&mut stream, &mut self.path);
+        stream.finish();
+        space.targets(&self.path, &mut self.values);
+    }
+
     /// The stored state under the present targets.
     pub(crate) fn replay<P: LightPathSpace<Path = T>>(&mut self, space: &P, rung: usize, base: &[u32], random: &mut UniformStream) {
-        space.trace(&mut Coordinates::replayed(base, random, &mut self.coordinates), &mut self.path);
-        space.targets(&self.path, &mut self.values);
+        self.coordinates.clear();
+        self.coordinates.extend_from_slice(base);
+        self.trace(space, random);
         self.life = if self.values[rung] > 0.0 { Life::Alive } else { Life::Dead };
     }
 

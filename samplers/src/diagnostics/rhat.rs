@@ -22,7 +22,7 @@ pub(crate) fn r_hat(chains: &[Vec<f32>]) -> Option<f64> {
     [normal_scores(&halves), normal_scores(&folded)].iter().filter_map(|z| potential_scale_reduction(z)).reduce(f64::max)
 }
 
-/// Every point replaced by the normal quantile of its rank among all, ties sharing their mean rank [VEHTARI21 (14)].
+/// Every point replaced by the normal quantile of its rank among all, ties sharing their mean rank [VEHTARI21 (14)] with Blom's offsets.
 fn normal_scores(halves: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut order: Vec<(f64, usize, usize)> =
         halves.iter().enumerate().flat_map(|(i, half)| half.iter().enumerate().map(move |(j, x)| (*x, i, j))).collect();

@@ -1,16 +1,16 @@
 //! One ensemble of a draw: a chain a rung, run by one thread from start to end.
 //!
-//! A step of rung c mutates its state and accepts with `min(1, T_c(y)/T_c(x))` [KELEMEN02]; the state *after* it is counted; then the chain
-//! tries an exchange with one neighbour, accepted with `min(1, T_a(x_b) T_b(x_a) / (T_a(x_a) T_b(x_b)))` [STF 4.3]. A step of rung 0 is an
+//! A step of rung c mutates its state and accepts with `min(1, T_c(y)/T_c(x))` \[KELEMEN02\]; the state *after* it is counted; then the chain
+//! tries an exchange with one neighbour, accepted with `min(1, T_a(x_b) T_b(x_a) / (T_a(x_a) T_b(x_b)))` \[STF\]. A step of rung 0 is an
 //! independent path `u`, which rung 1 takes with `min(1, T_1(u)/T_1(x_1))`: its old state would go to rung 0, whose next path is independent
-//! of it, so it is dropped [HACHISUKA11 4]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
+//! of it, so it is dropped \[HACHISUKA11\]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
 //! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
 
 use super::schedule::Schedule;
 use super::weights::Mixture;
 use crate::adapt::StepSize;
 use crate::diagnostics::blocks::{BLOCKS, Blocks};
-use crate::mutation::Coordinates;
+use crate::mutation::mutate_all;
 use crate::sampler::{CELLS, Drawn, LightPathSpace};
 use crate::state::{Chain, Life, State};
 use crate::stream::{Key, Purpose, UniformStream};
@@ -165,14 +165,13 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
     /// Traces the proposal: a mutation of the state of `rung`, or an independent path.
     #[inline]
     fn propose(&mut self, rung: usize, mutate: bool, counted: bool) {
-        let mut stream = if mutate {
-            let exponent = self.steps[rung - 1].0.exponent();
-            Coordinates::mutated(&self.states[rung - 1].coordinates, exponent, &mut self.random, &mut self.proposal.coordinates)
+        let made = &mut self.proposal.coordinates;
+        if mutate {
+            mutate_all(&self.states[rung - 1].coordinates, self.steps[rung - 1].0.exponent(), &mut self.random, made);
         } else {
-            Coordinates::fresh(&mut self.random, &mut self.proposal.coordinates)
-        };
-        self.space.trace(&mut stream, &mut self.proposal.path);
-        self.space.targets(&self.proposal.path, &mut self.proposal.values);
+            made.clear();
+        }
+        self.proposal.trace(self.space, &mut self.random);
         self.traced += 1;
         if counted {
             self.tallies[rung].proposals += 1;
@@ -288,7 +287,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         if !self.plan.exchanges {
             return;
         }
-        if *turn % 2 == 0 {
+        if turn.is_multiple_of(2) {
             if rung < self.states.len() {
                 self.exchange(rung, counted);
             }

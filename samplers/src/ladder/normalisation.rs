@@ -1,7 +1,7 @@
 //! Normalisations `b_c`, the integrals of the targets.
 //!
 //! `b_0 = 1`, and `b_{c+1} = b_c * mean of T_{c+1}/T_c` over the counted states of rung c, repeats included, because
-//! `E_{T_c/b_c}[T_{c+1}/T_c] = b_{c+1}/b_c` for nested supports [STF 4.2]. For c = 0 that is the mean of `T_1` over independent paths.
+//! `E_{T_c/b_c}[T_{c+1}/T_c] = b_{c+1}/b_c` for nested supports. For c = 0 that is the mean of `T_1` over independent paths.
 //! Errors of the ratios come from batch means; relative variances add up along the ladder, as for independent factors.
 
 use crate::diagnostics::blocks::Mean;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Combine {
-    /// The balance heuristic over rungs, with effective counts ([STF 6]; module `weights`).
+    /// The balance heuristic over rungs, with effective counts ([VEACH (9.8)]; module `weights`).
     #[default]
     Mis,
     /// Every rung's own estimate, weighted by the rung's share of the steps.
@@ -19,7 +19,7 @@ pub enum Combine {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Allocation {
-    /// Fixed shares: for four rungs 2/6, 1/6, 1/6, 2/6, those of [STF]'s own program; equal shares otherwise.
+    /// Fixed shares: for four rungs 2/6, 1/6, 1/6, 2/6, those of the program of \[STF\]; equal shares otherwise.
     #[default]
     Fixed,
     /// Shares that minimise the estimated variance for the cost, from earlier draws alone (module `allocation`).

@@ -2,7 +2,7 @@
 //!
 //! Rung i has density `T_i/b_i` and `N_i` counted states. With `w_i(u) = e_i (T_i/b'_i) / sum_j e_j T_j/b'_j` the weights of a path add up
 //! to 1 for *any* positive `e` and `b'`, so that `sum_i (b_i/N_i) sum_u w_i(u)/T_i(u) f(u)` is unbiased with the `b_i` outside alone
-//! ([STF 6], theory of the balance heuristic [VEACH 9.2]). `b'` is the last draw's estimate and frozen; a wrong one costs variance. With the
+//! (the balance heuristic [VEACH (9.8)] over the rungs of \[STF\]). `b'` is the last draw's estimate and frozen; a wrong one costs variance. With the
 //! same `b'` outside the estimate would be wrong by its error.
 //!
 //! **Effective counts.** The balance heuristic is derived for independent draws. `N` states of a chain whose contributions scatter `tau`

@@ -26,18 +26,24 @@ impl LightPathSpace for Easy {
     }
 }
 
-/// Measurements are ten strips of half the width each, in a thousandth of the space. Their relative variance is one over their
-/// width at density one; the last target is the inverse of the width, the best density there is.
+/// A thousandth of the space is visible, and there the measurements' contributions fall by `e^-8` along either axis: the last target follows
+/// them, the one before with a quarter of the exponent.
 struct Hard {
     /// What a path that misses costs, against 1 for one that hits.
     miss: f64,
 }
-const VISIBLE: f32 = 1e-3;
-const STRIPS: usize = 10;
+const SIDE: f64 = 0.0316;
+const FALL: f64 = 8.0;
 
-fn strip(p: &[f32; 2]) -> Option<usize> {
-    let strip = (-p[1].max(f32::MIN_POSITIVE).log2()).floor() as usize;
-    (p[0] < VISIBLE && strip < STRIPS).then_some(strip)
+/// Contribution of a path; 0 where it is not visible.
+fn contribution(p: &[f32; 2]) -> f64 {
+    let [x, y] = p.map(|u| f64::from(u) / SIDE);
+    if x < 1.0 && y < 1.0 { (-FALL * (x + y)).exp() } else { 0.0 }
+}
+
+/// Integral of the contribution.
+fn hard_truth() -> f64 {
+    (SIDE * (1.0 - (-FALL).exp()) / FALL).powi(2)
 }
 
 impl LightPathSpace for Hard {
@@ -46,17 +52,19 @@ impl LightPathSpace for Hard {
         *path = stream.next_2d();
     }
     fn targets(&self, p: &[f32; 2], values: &mut [f64]) {
-        let inverse = |power: f64| strip(p).map_or(0.0, |k| (power * k as f64).exp2());
-        values.copy_from_slice(&[1.0, inverse(0.0), inverse(0.5), inverse(1.0)]);
+        let f = contribution(p);
+        let v = f64::from(u8::from(f > 0.0));
+        values.copy_from_slice(&[1.0, v, v * f.powf(0.25), f]);
     }
     fn usefulness(&self, p: &[f32; 2]) -> f64 {
-        strip(p).map_or(0.0, |k| 4f64.powi(k as i32))
+        contribution(p).powi(2)
     }
     fn cell(&self, p: &[f32; 2]) -> Option<u32> {
-        strip(p).map(|k| k as u32)
+        let [x, y] = p.map(|u| (f64::from(u) / SIDE * 32.0) as u32);
+        (x < 32 && y < 32).then_some(y * 32 + x)
     }
     fn cost(&self, p: &[f32; 2]) -> f64 {
-        if strip(p).is_some() { 1.0 } else { self.miss }
+        if contribution(p) > 0.0 { 1.0 } else { self.miss }
     }
 }
 
@@ -105,12 +113,11 @@ fn estimates_with_measured_shares_are_unbiased() {
         let (mut easy_sum, mut hard_sum) = (0.0, 0.0);
         for i in 0..3 {
             easy_sum += integrals(&mut easy_ladder, &Easy, i, 20_000, |drawn| drawn.weight, |p| [f64::from(p[0] * p[1])])[0] / 3.0;
-            let in_strip = |p: &[f32; 2]| [f64::from(u8::from(strip(p) == Some(5)))];
-            hard_sum += integrals(&mut hard_ladder, &hard, i, 20_000, |drawn| drawn.weight, in_strip)[0] / 3.0;
+            hard_sum += integrals(&mut hard_ladder, &hard, i, 100_000, |drawn| drawn.weight, |p| [contribution(p)])[0] / 3.0;
         }
         runs.0.push(easy_sum);
         runs.1.push(hard_sum);
     }
     assert_mean(&runs.0, 0.25, 2, 0.02, "easy");
-    assert_mean(&runs.1, f64::from(VISIBLE) / 64.0, 2, 0.2, "a strip of the hard space");
+    assert_mean(&runs.1, hard_truth(), 2, 0.25, "hard");
 }

@@ -32,7 +32,7 @@ fn in_disks(p: &[f32; 2]) -> [f64; 4] {
 }
 
 const COUNT: u64 = 12_000;
-const RUNS: u64 = 60;
+const RUNS: u64 = 100;
 
 /// Areas from all rungs, from the pilot weights, and from the uniform rung alone agree with pi r^2.
 #[test]
