@@ -3,6 +3,7 @@
 use super::aim::{Aim, Rung};
 use super::light_paths::{LightPath, LightPaths};
 use super::points::{Points, Search, Touch};
+use super::tallies::Tallies;
 use crate::samplers::{CELLS, LightPathSpace, Stream};
 
 /// A light path and the measurement points it reaches.
@@ -28,6 +29,8 @@ pub struct AimedPaths<'a> {
     pub points: &'a Points<'a>,
     /// The ladder, uniform first.
     pub rungs: &'a [Rung],
+    /// What all traced paths cost.
+    pub tallies: &'a Tallies,
 }
 
 impl LightPathSpace for AimedPaths<'_> {
@@ -36,6 +39,7 @@ impl LightPathSpace for AimedPaths<'_> {
     fn trace<S: Stream>(&self, stream: &mut S, path: &mut AimedPath) {
         let AimedPath { light, touches, best, usefulness, search } = path;
         self.light.trace(stream, light);
+        self.tallies.add(&light.tally);
         self.points.touched(&light.vertices, search, touches);
         *best = Aim::default();
         *usefulness = 0.0;

@@ -6,5 +6,6 @@ pub mod deposits;
 pub mod light_paths;
 pub mod points;
 pub mod regions;
+pub mod tallies;
 
 pub use light_paths::{LightPath, LightPaths, LightVertex};

@@ -13,6 +13,7 @@ use crate::targets::aimed::AimedPaths;
 use crate::targets::deposits::{Deposits, collect};
 use crate::targets::points::Points;
 use crate::targets::regions::Regions;
+use crate::targets::tallies::Tallies;
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -58,13 +59,16 @@ impl Aimed {
         let aims = self.aimer.aim(&points, self.place(&sppm.eye), shrink(i, sppm.settings.alpha));
         points.set_aims(aims.iter().copied());
         let light = sppm.light_paths();
-        let space = AimedPaths { light, points: &points, rungs: &self.rungs };
+        let tallies = Tallies::default();
+        let space = AimedPaths { light, points: &points, rungs: &self.rungs, tallies: &tallies };
         let leaves = self.aimer.regions.as_ref().map_or(0, Regions::leaves);
         let (count, strata) = (points.all().len(), self.ladder.strata());
         let start = || Deposits::new(count, strata, leaves);
         let paths = if light.max_depth == 0 { 0 } else { sppm.photon_count };
         let draw = self.ladder.draw(&space, i, paths, start, |deposits, path, drawn| deposits.add(&points, path, drawn));
         stats.light_paths += draw.traced;
+        stats.count(&tallies.total());
+        self.tell(i);
         draw.batches.iter().for_each(|deposits| stats.count(&deposits.tally));
         let (sums, halves) = collect(&draw, count);
 
@@ -85,6 +89,26 @@ impl Aimed {
         let sample = |tally: &mut Tally, x: usize, y: usize| tally.finite(values[y * width + x]);
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
         glossy
+    }
+
+    /// A line a rung for those who ask.
+    fn tell(&self, i: u64) {
+        if !tracing::enabled!(tracing::Level::DEBUG) {
+            return;
+        }
+        for (name, rung) in self.rungs.iter().zip(self.ladder.report().rungs) {
+            tracing::debug!(
+                "iteration {i}, {name:?}: share {:.3} then {:.3}, accepted {:.3}, step {:.4}, dispersion {:.2}, b {:.5} +- {:.5}, exchanged {:.3}",
+                rung.share,
+                rung.next_share,
+                rung.acceptance.unwrap_or(f64::NAN),
+                rung.step_size.unwrap_or(f64::NAN),
+                rung.dispersion,
+                rung.normalisation,
+                rung.normalisation_error,
+                rung.exchange_rate.unwrap_or(f64::NAN)
+            );
+        }
     }
 
     /// The ladder's diagnostics and the number of regions.
