@@ -33,8 +33,10 @@ pub struct RungReport {
     pub steps: u64,
     /// Steps that were made and not counted because the chain stood on a dead state or had none; cumulative, burn-in left out.
     pub uncounted: u64,
-    /// Fraction of mutations accepted in the last draw.
+    /// Fraction of small steps accepted in the last draw.
     pub acceptance: Option<f64>,
+    /// Fraction of redrawn ends accepted in the last draw.
+    pub redraw_acceptance: Option<f64>,
     /// Step size `d`, mean over ensembles.
     pub step_size: Option<f64>,
     /// Dispersion of counts per cell over ensembles, at least 1; pooled over draws. 1 while unknown.

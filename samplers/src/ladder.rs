@@ -5,6 +5,7 @@
 //! that only its end knows and [`Draw::scales`] carries. A ladder with two rungs is visibility-driven photon tracing \[HACHISUKA11\], one with
 //! four the spatial target function \[STF\].
 
+mod carry;
 mod ensemble;
 mod normalisation;
 mod schedule;
@@ -20,6 +21,7 @@ use crate::diagnostics::dispersion::Dispersion;
 use crate::diagnostics::{LadderReport, TRACE_POINTS};
 use crate::sampler::{Draw, Drawn, LightPathSpace, PhotonSampler};
 use crate::state::Chain;
+use carry::{Carried, KEPT};
 use ensemble::{Outcome, Plan};
 use normalisation::Normalisation;
 use rayon::prelude::*;
@@ -41,11 +43,15 @@ pub struct Ladder {
     traced: u64,
     /// Chains of rungs 1 and up, by ensemble.
     chains: Vec<Vec<Chain>>,
+    /// States of the last draw, by rung.
+    carried: Vec<Carried>,
     normalisation: Normalisation,
     dispersions: Vec<Dispersion>,
     /// Shares of the steps in the next draw.
     shares: Vec<f64>,
     exchanges: bool,
+    /// The next draw's targets are new to the chains.
+    retargeted: bool,
     summary: Summary,
 }
 
@@ -57,10 +63,12 @@ impl Ladder {
             draws: 0,
             traced: 0,
             chains: vec![vec![Chain::default(); rungs - 1]; settings.ensembles.max(1)],
+            carried: vec![Carried::default(); rungs],
             normalisation: Normalisation::new(rungs),
             dispersions: vec![Dispersion::default(); rungs],
             shares: schedule::fixed_shares(rungs),
             exchanges: true,
+            retargeted: true,
             summary: Summary::new(rungs),
             settings,
         }
@@ -70,6 +78,13 @@ impl Ladder {
     /// keep their laws but not their way from island to island.
     pub fn without_exchanges(self) -> Self {
         Self { exchanges: false, ..self }
+    }
+
+    /// Says that the next draw's targets differ from the last draw's by more than what follows from new measurements: its chains burn in as at
+    /// first. Where a target was made from what these very chains found, they stand where it has just become small, and without burn-in
+    /// they give too much there.
+    pub fn retargeted(&mut self) {
+        self.retargeted = true;
     }
 
     /// The settings it was made with.
@@ -95,7 +110,13 @@ impl Ladder {
 
     /// `tau` of every rung: 1 for rung 0, `unknown` where nothing is known.
     fn taus(&self, unknown: f64) -> Vec<f64> {
-        let tau = |(rung, dispersion): (usize, &Dispersion)| if rung == 0 { 1.0 } else { dispersion.tau().unwrap_or(unknown) };
+        // A chain that few steps are dealt to begins each with a state that is new to it, and scatters less than it would alone. Rejections
+        // alone would make a chain of acceptance a worth (2 - a)/a of its steps less.
+        let alone = |rung: usize| self.summary.acceptance(rung).map_or(1.0, |a| (2.0 - a) / a.max(1e-6));
+        let tau = |(rung, dispersion): (usize, &Dispersion)| match rung {
+            0 => 1.0,
+            _ => dispersion.tau().map_or(unknown, |tau| tau.max(alone(rung))),
+        };
         self.dispersions.iter().enumerate().map(tau).collect()
     }
 
@@ -130,10 +151,12 @@ impl Ladder {
             iteration,
             shares,
             mixture: Mixture::new(settings.combine, shares, &self.normalisation.assumed, &self.taus(1.0)),
-            burn_in: if self.draws == 0 { settings.first_burn_in } else { settings.later_burn_in },
+            burn_in: if self.retargeted { settings.first_burn_in } else { settings.later_burn_in },
             acceptance: settings.acceptance,
+            redraw: settings.redraw,
             exchanges: self.exchanges,
             trace_strides: stride(TRACE_POINTS as u64),
+            carry_strides: stride(KEPT),
             sample_strides: if settings.allocation == Allocation::Measured { stride(SAMPLES) } else { Vec::new() },
         }
     }
@@ -142,7 +165,9 @@ impl Ladder {
     fn allocate(&mut self, summary: &summary::DrawSummary) {
         let (problem, costs) = summary.problem(&self.normalisation.assumed, &self.taus(FIRST_DISPERSION));
         if let Some(shares) = problem.solve(&floors(self.strata())) {
-            self.shares = steps_for(&shares, &costs);
+            // Half way: what a rung is worth depends on the shares it is measured at.
+            let wanted = steps_for(&shares, &costs);
+            self.shares.iter_mut().zip(wanted).for_each(|(share, wanted)| *share = 0.5 * (*share + wanted));
         }
     }
 }
@@ -173,6 +198,12 @@ impl PhotonSampler for Ladder {
                 self.normalisation.assumed = vec![1.0];
             }
         }
+        for rung in 1..rungs {
+            let chains = self.chains.iter_mut().map(|chains| &mut chains[rung - 1]);
+            let (traced, dead) = self.carried[rung].start(space, (self.settings.seed, iteration), rung, rungs, chains);
+            self.traced += traced;
+            self.summary.add_dead(rung, dead);
+        }
         let shares = self.shares.clone();
         let plan = self.plan(iteration, count, &shares);
         let ensembles = self.chains.len() as u64;
@@ -194,14 +225,16 @@ impl PhotonSampler for Ladder {
         for (rung, dispersion) in self.dispersions.iter_mut().enumerate() {
             drawn.disperse(rung, dispersion);
         }
+        drawn.carry(&mut self.carried);
+        self.summary.add(&drawn, &shares, &plan.trace_strides);
         let pooled_below = if self.settings.normaliser == Normaliser::Pooled { self.settings.poolable } else { 0 };
         self.normalisation.update(&drawn.ratios(), pooled_below);
         if self.settings.allocation == Allocation::Measured && rungs > 1 {
             self.allocate(&drawn);
         }
         self.draws += 1;
+        self.retargeted = false;
         let scales = (0..rungs).map(|rung| drawn.scale(rung, self.normalisation.b(rung))).collect();
-        self.summary.add(&drawn, &shares, &plan.trace_strides);
         Draw { batches, scales, traced: self.traced - traced_before }
     }
 }

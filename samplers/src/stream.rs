@@ -118,6 +118,12 @@ impl UniformStream {
     pub(crate) fn chance(&mut self) -> f64 {
         (self.rng.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
+
+    /// A whole number below `count`, which is positive; uniform to a 2^-32nd.
+    #[inline(always)]
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        ((u64::from(self.bits()) * count as u64) >> 32) as usize
+    }
 }
 
 impl Stream for UniformStream {

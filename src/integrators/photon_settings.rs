@@ -134,7 +134,7 @@ pub struct ChainSettings {
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub combine: Option<CombineName>,
-    /// Proposals a chain thrown away at the start of an iteration; default 1000 in the first, 0 later
+    /// Proposals a chain thrown away at the start of an iteration; default 1000 in the first and after each update of densities, else 0
     #[arg(long, value_name = "B")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub burn_in: Option<u64>,
@@ -146,6 +146,10 @@ pub struct ChainSettings {
     #[arg(long, value_name = "A")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub acceptance: Option<f64>,
+    /// Share of a chain's steps that redraw a path from a random vertex on, in [0, 1); default 0.5, 0 for small steps alone
+    #[arg(long, value_name = "P")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub redraw: Option<f64>,
     /// Where the rungs' normalisations come from; default pass
     #[arg(long, value_enum, value_name = "FROM")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -211,6 +215,7 @@ impl LadderPlan {
             first_burn_in: chains.burn_in.unwrap_or(defaults.first_burn_in),
             later_burn_in: chains.burn_in.unwrap_or(defaults.later_burn_in),
             acceptance: chains.acceptance.unwrap_or(defaults.acceptance),
+            redraw: chains.redraw.unwrap_or(defaults.redraw),
             combine: match chains.combine.unwrap_or(CombineName::Mis) {
                 CombineName::Mis => Combine::Mis,
                 CombineName::Average => Combine::Average,
@@ -294,7 +299,7 @@ impl PhotonSettings {
         let chains = &self.chains;
         if self.sampler == SamplerName::Uniform && *chains != ChainSettings::default() {
             return Err(
-                "rungs, combine, burn-in, ensembles, acceptance, normaliser, steps and the options of densities belong to Metropolis \
+                "rungs, combine, burn-in, ensembles, acceptance, redraw, normaliser, steps and the options of densities belong to Metropolis \
                         samplers: give --sampler visibility, kernel, image or spatial"
                     .into(),
             );
@@ -311,6 +316,11 @@ impl PhotonSettings {
             && !(a > 0.0 && a < 1.0)
         {
             return Err(format!("--acceptance must lie in (0, 1), not {a}"));
+        }
+        if let Some(p) = chains.redraw
+            && !(0.0..1.0).contains(&p)
+        {
+            return Err(format!("--redraw must lie in [0, 1), not {p}"));
         }
         if chains.ensembles.is_some_and(|n| !(2..=4096).contains(&n)) {
             return Err("--ensembles must lie in 2..4096".into());

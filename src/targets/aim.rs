@@ -47,9 +47,13 @@ pub struct Aimer {
     /// Regions of a spatial or image target.
     pub regions: Option<Regions>,
     /// Where densities are read.
-    pub refinement: Refinement,
-    /// Regions read in the last iteration.
-    pub region_count: usize,
+    refinement: Refinement,
+    /// Compressed inverse densities by leaf, in a scale that gives the full target a mean of one when they are read; empty before.
+    inverse_densities: Vec<f64>,
+    /// Regions read.
+    region_count: usize,
+    /// Iterations aimed.
+    iterations: u64,
 }
 
 /// Which place a measurement point has in the regions' tree.
@@ -77,14 +81,24 @@ impl Place {
 impl Aimer {
     /// Nothing known yet.
     pub fn new(regions: Option<Regions>, refinement: Refinement) -> Self {
-        Self { scale: None, regions, refinement, region_count: 0 }
+        Self { scale: None, regions, refinement, inverse_densities: Vec::new(), region_count: 0, iterations: 0 }
     }
 
-    /// Targets at every point. `shrink` is the radius schedule's factor on the first iteration's radii.
-    pub fn aim(&mut self, points: &Points<'_>, place: Place, shrink: f64) -> Vec<Aim> {
+    /// Regions that the present densities come from.
+    pub fn region_count(&self) -> usize {
+        self.region_count
+    }
+
+    /// Targets at every point, and whether the full target is a new one. `shrink` is the radius schedule's factor on the first iteration's
+    /// radii.
+    ///
+    /// Densities are read before iterations 1, 2, 4, 8, ... and stay in between. [STF] reads them before every iteration, which has a bias: where
+    /// chains have lingered the density is found too high and the target made low, while the chains still stand there and bring
+    /// more than the new target grants. Chains that are burnt in again at a new target forget that; at doubling intervals it costs little.
+    pub fn aim(&mut self, points: &Points<'_>, place: Place, shrink: f64) -> (Vec<Aim>, bool) {
         let sizes: Vec<f64> = points.all().iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
         if sizes.is_empty() {
-            return Vec::new();
+            return (Vec::new(), false);
         }
         let (largest, mean) = *self.scale.get_or_insert_with(|| {
             let largest = sizes.iter().copied().fold(0.0, f64::max);
@@ -92,24 +106,33 @@ impl Aimer {
             (largest, mean)
         });
         let mut aims: Vec<Aim> = sizes.iter().map(|s| Aim { kernel: (inverse(s / largest) / mean) as f32, ..Aim::default() }).collect();
-        let Some(regions) = &mut self.regions else {
-            aims.iter_mut().for_each(|aim| aim.full = aim.kernel);
-            return aims;
-        };
-        aims.iter_mut().enumerate().for_each(|(i, aim)| aim.leaf = regions.leaf(place.of(points, i)));
-        let (densities, count) = regions.densities(self.refinement);
-        self.region_count = count;
+        if let Some(regions) = &self.regions {
+            aims.iter_mut().enumerate().for_each(|(i, aim)| aim.leaf = regions.leaf(place.of(points, i)));
+        }
+        let new = self.iterations.is_power_of_two() && self.read_densities(&aims);
+        self.iterations += 1;
         // Nothing known: the full target starts as the kernel's (theory B.7).
-        let density = |aim: &Aim| densities.get(aim.leaf as usize).copied();
-        let densest = aims.iter().filter_map(density).fold(0.0, f64::max);
-        let values: Vec<f64> = aims
-            .iter()
-            .map(|aim| f64::from(aim.kernel) * density(aim).filter(|_| densest > 0.0).map_or(1.0, |d| inverse(d / densest)))
-            .collect();
-        // A mean of one keeps the normalisation alike while densities are being learned.
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        aims.iter_mut().zip(values).for_each(|(aim, value)| aim.full = (value / mean) as f32);
-        aims
+        for aim in &mut aims {
+            aim.full = self.inverse_densities.get(aim.leaf as usize).map_or(aim.kernel, |inverse| (f64::from(aim.kernel) * inverse) as f32);
+        }
+        (aims, new)
+    }
+
+    /// Whether there were any.
+    fn read_densities(&mut self, aims: &[Aim]) -> bool {
+        let Some(regions) = &mut self.regions else { return false };
+        let (densities, count) = regions.densities(self.refinement);
+        // The largest of the regions that hold measurement points.
+        let densest = aims.iter().filter_map(|aim| densities.get(aim.leaf as usize)).copied().fold(0.0, f64::max);
+        if densest <= 0.0 {
+            return false;
+        }
+        self.region_count = count;
+        let mut inverses: Vec<f64> = densities.into_iter().map(|density| inverse((density / densest).min(1.0))).collect();
+        let mean = aims.iter().map(|aim| f64::from(aim.kernel) * inverses[aim.leaf as usize]).sum::<f64>() / aims.len() as f64;
+        inverses.iter_mut().for_each(|value| *value /= mean);
+        self.inverse_densities = inverses;
+        true
     }
 }
 

@@ -7,10 +7,14 @@
 //! `tau = sum_k sum_e (n_ek - p_k N_e)^2 / (E - 1)  over  sum_k p_k (1 - p_k) mean_e N_e`
 //!
 //! is the mean of the cells' times weighted by what each contributes to the variance, and it sees what no single chain can: ensembles stuck
-//! on different islands. Numerator and denominator are summed over draws before they are divided.
+//! on different islands. Numerator and denominator are summed over draws before they are divided, the past fading: shares, step sizes
+//! and targets move, and the number with them.
 
 use crate::sampler::CELLS;
 use serde::{Deserialize, Serialize};
+
+/// What a draw keeps of the past.
+const KEPT: f64 = 0.75;
 
 /// Numerator and denominator of one rung, summed over draws.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -27,6 +31,8 @@ impl Dispersion {
         if ensembles.len() < 2 {
             return;
         }
+        self.scatter *= KEPT;
+        self.independent *= KEPT;
         let steps: f64 = ensembles.iter().map(|(steps, _)| *steps as f64).sum();
         for cell in 0..CELLS {
             let hits: u64 = ensembles.iter().map(|(_, cells)| u64::from(cells[cell])).sum();

@@ -5,7 +5,13 @@
 //! independent path `u`, which rung 1 takes with `min(1, T_1(u)/T_1(x_1))`: its old state would go to rung 0, whose next path is independent
 //! of it, so it is dropped \[HACHISUKA11\]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
 //! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
+//!
+//! **Redrawn ends.** Some steps keep the coordinates before a cut and draw the rest afresh: where it is hard to come in and easy to move
+//! about inside, they leave a place at once that small steps linger in. The cut is uniform over the `L(x)` coordinates the path used, and a
+//! path that keeps the first k of them uses more than k, so the way back exists with probability `1/L(y)`; the acceptance is
+//! `min(1, T_c(y) L(x) / (T_c(x) L(y)))`. This is not in [STF] or [HACHISUKA11].
 
+use super::carry::Carried;
 use super::schedule::Schedule;
 use super::weights::Mixture;
 use crate::adapt::StepSize;
@@ -23,9 +29,13 @@ pub(super) struct Plan<'a> {
     pub(super) mixture: Mixture,
     pub(super) burn_in: u64,
     pub(super) acceptance: f64,
+    /// Probability that a step redraws the path's end in place of mutating all of it.
+    pub(super) redraw: f64,
     pub(super) exchanges: bool,
     /// Steps of each rung between two points of its trace.
     pub(super) trace_strides: Vec<u64>,
+    /// Steps of each rung between two states kept for the next draw.
+    pub(super) carry_strides: Vec<u64>,
     /// Steps of each rung between two samples for the allocation; none are taken if it is empty.
     pub(super) sample_strides: Vec<u64>,
 }
@@ -40,8 +50,12 @@ pub(super) struct Tally {
     /// Logarithm of the last rung's target.
     pub(super) log: Blocks,
     pub(super) uncounted: u64,
+    /// Small steps.
     pub(super) mutated: u64,
     pub(super) accepted: u64,
+    /// Redrawn ends.
+    pub(super) redrawn: u64,
+    pub(super) redrawn_accepted: u64,
     /// Exchanges with the next rung.
     pub(super) attempts: u64,
     pub(super) exchanged: u64,
@@ -55,8 +69,22 @@ pub(super) struct Tally {
     pub(super) trace: Vec<f32>,
     /// Rows of all targets and the usefulness.
     pub(super) samples: Vec<f64>,
+    /// States kept for the next draw.
+    pub(super) carried: Carried,
     until_trace: u64,
+    until_carried: u64,
     until_sample: u64,
+}
+
+/// Where a step goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Proposal {
+    /// An independent path.
+    Independent,
+    /// A small step in every coordinate.
+    Small,
+    /// The coordinates before a cut as they are, independent ones from there on.
+    End,
 }
 
 /// What an ensemble leaves.
@@ -162,14 +190,20 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         }
     }
 
-    /// Traces the proposal: a mutation of the state of `rung`, or an independent path.
+    /// Traces a proposal.
     #[inline]
-    fn propose(&mut self, rung: usize, mutate: bool, counted: bool) {
+    fn propose(&mut self, rung: usize, how: Proposal, counted: bool) {
         let made = &mut self.proposal.coordinates;
-        if mutate {
-            mutate_all(&self.states[rung - 1].coordinates, self.steps[rung - 1].0.exponent(), &mut self.random, made);
-        } else {
-            made.clear();
+        made.clear();
+        match how {
+            Proposal::Independent => {}
+            Proposal::Small => {
+                mutate_all(&self.states[rung - 1].coordinates, self.steps[rung - 1].0.exponent(), &mut self.random, made);
+            }
+            Proposal::End => {
+                let kept = &self.states[rung - 1].coordinates;
+                made.extend_from_slice(&kept[..self.random.below(kept.len())]);
+            }
         }
         self.proposal.trace(self.space, &mut self.random);
         self.traced += 1;
@@ -180,7 +214,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
     }
 
     fn uniform_step(&mut self, counted: Option<Place>) {
-        self.propose(0, false, counted.is_some());
+        self.propose(0, Proposal::Independent, counted.is_some());
         if let Some(place) = counted {
             self.count_uniform(place);
         }
@@ -214,18 +248,32 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
 
     fn chain_step(&mut self, rung: usize, counted: Option<Place>) {
         let state = &self.states[rung - 1];
-        let (life, old, climbed) = (state.life, state.values[rung], state.climbed);
-        self.propose(rung, life != Life::Empty, counted.is_some());
+        let (life, old, climbed, length) = (state.life, state.values[rung], state.climbed, state.coordinates.len());
+        let how = match life {
+            Life::Empty => Proposal::Independent,
+            Life::Alive if length > 0 && self.random.chance() < self.plan.redraw => Proposal::End,
+            Life::Alive | Life::Dead => Proposal::Small,
+        };
+        self.propose(rung, how, counted.is_some());
         let new = self.proposal.values[rung];
         if life == Life::Alive {
-            let accepted = self.random.chance() * old < new;
-            self.steps[rung - 1].0.learn(accepted, self.plan.acceptance);
+            // The cut is one of `length` places on the way there, and the same one of as many as the proposal has on the way back.
+            let lengths = if how == Proposal::End { length as f64 / self.proposal.coordinates.len() as f64 } else { 1.0 };
+            let accepted = self.random.chance() * old < new * lengths;
+            if how == Proposal::Small {
+                self.steps[rung - 1].0.learn(accepted, self.plan.acceptance);
+            }
             if accepted {
                 self.take(rung, climbed);
             }
             if let Some(place) = counted {
-                self.tallies[rung].mutated += 1;
-                self.tallies[rung].accepted += u64::from(accepted);
+                let tally = &mut self.tallies[rung];
+                let (made, taken) = match how {
+                    Proposal::End => (&mut tally.redrawn, &mut tally.redrawn_accepted),
+                    Proposal::Small | Proposal::Independent => (&mut tally.mutated, &mut tally.accepted),
+                };
+                *made += 1;
+                *taken += u64::from(accepted);
                 self.count(rung, place);
             }
         } else {
@@ -267,6 +315,11 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
             tally.trace.push(state.log as f32);
         }
         tally.until_trace -= 1;
+        if tally.until_carried == 0 {
+            tally.until_carried = self.plan.carry_strides[rung];
+            tally.carried.push(&state.coordinates, state.values[rung], state.climbed);
+        }
+        tally.until_carried -= 1;
         sample(tally, self.plan, rung, state, self.space);
     }
 

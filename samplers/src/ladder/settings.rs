@@ -48,12 +48,14 @@ pub struct LadderSettings {
     /// Independent groups of chains, one chain a rung: at least one (0 counts as 1). Work is shared between threads by ensemble, and
     /// standard errors, dispersion and R-hat compare ensembles.
     pub ensembles: usize,
-    /// Steps of every rung that are thrown away at the start of the first draw.
+    /// Steps of every rung that are thrown away at the start of the first draw, and of a draw after [`Ladder::retargeted`](crate::Ladder::retargeted).
     pub first_burn_in: u64,
     /// The same at the start of every later draw.
     pub later_burn_in: u64,
     /// Acceptance that step sizes are steered to, in (0, 1).
     pub acceptance: f64,
+    /// Share of a chain's steps, in [0, 1), that redraw the path from a random coordinate on; the rest are small steps.
+    pub redraw: f64,
     /// How rungs are joined.
     pub combine: Combine,
     /// How steps are shared.
@@ -75,6 +77,7 @@ impl Default for LadderSettings {
             first_burn_in: 1000,
             later_burn_in: 0,
             acceptance: 0.234,
+            redraw: 0.5,
             combine: Combine::Mis,
             allocation: Allocation::Fixed,
             normaliser: Normaliser::Pass,

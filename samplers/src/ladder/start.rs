@@ -71,6 +71,30 @@ fn key(seed: u64, iteration: u64, index: u64) -> Key {
     Key { seed, iteration, index, purpose: Purpose::Pilot }
 }
 
+/// `count` numbers of candidates, each taken with probability proportional to its worth; none where nothing is worth anything. Their
+/// positions in the cumulated worths are evenly spaced with a common random offset in [0, 1): each has the right law, and no candidate is taken
+/// twice while another as good is left out.
+pub(super) fn evenly(worths: &[f64], offset: f64, count: usize) -> Vec<usize> {
+    let total: f64 = worths.iter().sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return Vec::new();
+    }
+    let spacing = total / count as f64;
+    let (mut place, mut sum) = (0, worths[0]);
+    let position = |i: usize| {
+        while sum <= (i as f64 + offset) * spacing && place + 1 < worths.len() {
+            place += 1;
+            sum += worths[place];
+        }
+        // Rounding of the sum can carry the last position past the last candidate that is worth anything.
+        while worths[place] <= 0.0 && place > 0 {
+            place -= 1;
+        }
+        place
+    };
+    (0..count).map(position).collect()
+}
+
 impl Pool {
     fn targets(&self, rung: usize) -> impl Iterator<Item = f64> + '_ {
         self.values.chunks_exact(self.rungs).map(move |values| values[rung])
@@ -90,8 +114,7 @@ impl Pool {
         Mean::of_independent(sum, squares, self.paths)
     }
 
-    /// Gives every ensemble's chain of `rung` a start. The ensembles' positions in the cumulated targets are evenly spaced with a common
-    /// random offset: each has the right law, and no path is taken twice while another as likely is left out.
+    /// Gives every ensemble's chain of `rung` a start.
     pub(super) fn start<'a, P: LightPathSpace>(
         &self,
         space: &P,
@@ -99,21 +122,11 @@ impl Pool {
         rung: usize,
         chains: impl ExactSizeIterator<Item = &'a mut Chain>,
     ) {
-        let total: f64 = self.targets(rung).sum();
-        if total <= 0.0 {
-            return;
-        }
-        let spacing = total / chains.len() as f64;
         let offset = f64::from(key(seed, iteration, self.paths + rung as u64).stream().next_1d());
+        let worths: Vec<f64> = self.targets(rung).collect();
         let mut path = P::Path::default();
-        let mut place = 0;
-        let mut sum = self.values[rung];
-        for (i, chain) in chains.enumerate() {
-            let wanted = (i as f64 + offset) * spacing;
-            while sum <= wanted && place + 1 < self.visible.len() {
-                place += 1;
-                sum += self.values[place * self.rungs + rung];
-            }
+        let places = evenly(&worths, offset, chains.len());
+        for (chain, place) in chains.zip(places) {
             let mut random = key(seed, iteration, self.visible[place].index).stream();
             space.trace(&mut Coordinates::fresh(&mut random, &mut chain.coordinates), &mut path);
             chain.life = Life::Alive;

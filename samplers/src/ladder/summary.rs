@@ -1,6 +1,7 @@
 //! What a draw's tallies come to, and what is kept of them for reports.
 
 use super::Ladder;
+use super::carry::Carried;
 use super::ensemble::Tally;
 use crate::allocation::Problem;
 use crate::diagnostics::blocks::Mean;
@@ -53,6 +54,17 @@ impl DrawSummary {
         Mean::of_blocks(self.rung(rung).map(|tally| (&tally.log, &tally.steps)))
     }
 
+    /// States of every rung for the next draw; rungs without any keep what they had.
+    pub(super) fn carry(&self, carried: &mut [Carried]) {
+        for (rung, carried) in carried.iter_mut().enumerate() {
+            let mut new = Carried::default();
+            self.rung(rung).for_each(|tally| new.append(&tally.carried));
+            if !new.is_empty() {
+                *carried = new;
+            }
+        }
+    }
+
     /// Adds the draw's counts per cell.
     pub(super) fn disperse(&self, rung: usize, dispersion: &mut Dispersion) {
         let ensembles: Vec<(u64, &[u32])> = self.rung(rung).map(|tally| (tally.steps.iter().sum(), tally.cells.as_slice())).collect();
@@ -96,6 +108,10 @@ struct RungSummary {
     steps: u64,
     uncounted: u64,
     acceptance: Option<f64>,
+    /// Of redrawn ends.
+    redraw_acceptance: Option<f64>,
+    /// Of all steps.
+    moved: Option<f64>,
     attempts: u64,
     exchanged: u64,
     dead: u64,
@@ -113,6 +129,16 @@ impl Summary {
         Self { rungs: vec![RungSummary::default(); rungs], ..Self::default() }
     }
 
+    /// Fraction of a rung's steps in the last draw that moved.
+    pub(super) fn acceptance(&self, rung: usize) -> Option<f64> {
+        self.rungs[rung].moved
+    }
+
+    /// Counts stored states that are worth nothing under the present targets.
+    pub(super) fn add_dead(&mut self, rung: usize, dead: u64) {
+        self.rungs[rung].dead += dead;
+    }
+
     /// Adds a draw.
     pub(super) fn add(&mut self, draw: &DrawSummary, shares: &[f64], strides: &[u64]) {
         self.independent = draw.steps(0);
@@ -121,7 +147,11 @@ impl Summary {
             summary.share = shares[rung];
             summary.steps += draw.steps(rung);
             summary.uncounted += draw.sum(rung, |tally| tally.uncounted);
-            summary.acceptance = fraction(draw.sum(rung, |tally| tally.accepted), draw.sum(rung, |tally| tally.mutated));
+            let [accepted, mutated] = [draw.sum(rung, |tally| tally.accepted), draw.sum(rung, |tally| tally.mutated)];
+            let [taken, redrawn] = [draw.sum(rung, |tally| tally.redrawn_accepted), draw.sum(rung, |tally| tally.redrawn)];
+            summary.acceptance = fraction(accepted, mutated);
+            summary.redraw_acceptance = fraction(taken, redrawn);
+            summary.moved = fraction(accepted + taken, mutated + redrawn);
             summary.attempts += draw.sum(rung, |tally| tally.attempts);
             summary.exchanged += draw.sum(rung, |tally| tally.exchanged);
             summary.dead += draw.sum(rung, |tally| tally.dead);
@@ -155,8 +185,9 @@ impl Summary {
             steps: kept.steps,
             uncounted: kept.uncounted,
             acceptance: kept.acceptance,
+            redraw_acceptance: kept.redraw_acceptance,
             step_size: chain.then(|| sizes.sum::<f64>() / ladder.chains.len() as f64),
-            dispersion: ladder.taus(1.0)[rung],
+            dispersion: if chain { ladder.dispersions[rung].tau().unwrap_or(1.0) } else { 1.0 },
             normalisation,
             normalisation_error: error,
             normalisation_relative_error: (normalisation > 0.0).then(|| error / normalisation),

@@ -56,7 +56,10 @@ impl Aimed {
         let (mut values, mut points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
-        let aims = self.aimer.aim(&points, self.place(&sppm.eye), shrink(i, sppm.settings.alpha));
+        let (aims, new) = self.aimer.aim(&points, self.place(&sppm.eye), shrink(i, sppm.settings.alpha));
+        if new {
+            self.ladder.retargeted();
+        }
         points.set_aims(aims.iter().copied());
         let light = sppm.light_paths();
         let tallies = Tallies::default();
@@ -98,10 +101,11 @@ impl Aimed {
         }
         for (name, rung) in self.rungs.iter().zip(self.ladder.report().rungs) {
             tracing::debug!(
-                "iteration {i}, {name:?}: share {:.3} then {:.3}, accepted {:.3}, step {:.4}, dispersion {:.2}, b {:.5} +- {:.5}, exchanged {:.3}",
+                "iteration {i}, {name:?}: share {:.3} then {:.3}, accepted {:.3} and {:.3}, step {:.4}, dispersion {:.2}, b {:.5} +- {:.5}, exchanged {:.3}",
                 rung.share,
                 rung.next_share,
                 rung.acceptance.unwrap_or(f64::NAN),
+                rung.redraw_acceptance.unwrap_or(f64::NAN),
                 rung.step_size.unwrap_or(f64::NAN),
                 rung.dispersion,
                 rung.normalisation,
@@ -116,7 +120,7 @@ impl Aimed {
         let mut report = json!(self.ladder.report());
         report["rung_names"] = json!(self.rungs);
         if let Some(regions) = &self.aimer.regions {
-            report["regions"] = json!({ "leaves": regions.leaves(), "in_use": self.aimer.region_count });
+            report["regions"] = json!({ "leaves": regions.leaves(), "in_use": self.aimer.region_count() });
         }
         report
     }
