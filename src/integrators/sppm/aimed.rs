@@ -2,6 +2,7 @@
 //!
 //! [STF, algorithm 1]: measurement points, targets at them, light paths by replica exchange, statistics of regions.
 
+use super::super::chains::{ChainReport, RegionReport};
 use super::super::photon_settings::{LadderPlan, PhotonSettings, RegionKind};
 use super::{Eye, Glossy, IterationStats, Radius, Sppm};
 use crate::image::film::Film;
@@ -15,7 +16,6 @@ use crate::targets::points::Points;
 use crate::targets::regions::Regions;
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
 /// Camera paths a pixel in the pilot that the regions are built over [STF 4.2].
 const PILOT: u64 = 4;
@@ -87,13 +87,9 @@ impl Aimed {
     }
 
     /// The ladder's diagnostics and the number of regions.
-    pub(super) fn report(&self) -> Value {
-        let mut report = json!(self.ladder.report());
-        report["rung_names"] = json!(self.rungs);
-        if let Some(regions) = &self.aimer.regions {
-            report["regions"] = json!({ "leaves": regions.leaves(), "in_use": self.aimer.region_count });
-        }
-        report
+    pub(super) fn report(&self) -> ChainReport {
+        let report = |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.region_count };
+        ChainReport { names: self.rungs.clone(), ladder: self.ladder.report(), regions: self.aimer.regions.as_ref().map(report) }
     }
 }
 
