@@ -150,7 +150,8 @@ fn text(document: &Value) -> String {
     let mut out = String::new();
     let mut document = document.clone();
     // What methods tell of themselves is nested deeper than the rest, and has a section of its own.
-    let told = document.pointer_mut("/isophote/diagnostics").map(Value::take).unwrap_or(Value::Null);
+    let isophote = document.get_mut("isophote").and_then(Value::as_object_mut);
+    let told = isophote.and_then(|metadata| metadata.shift_remove("diagnostics")).unwrap_or(Value::Null);
     if let Value::Object(map) = &document {
         for (key, value) in map {
             entry(&mut out, key, value);

@@ -45,8 +45,12 @@ fn row(name: &str, rung: &RungReport) -> Vec<String> {
     let or_dash = |value: Option<f64>, show: fn(f64) -> String| value.map_or_else(|| "-".to_owned(), show);
     let percent = |v: f64| format!("{:.1} %", 100.0 * v);
     let relative = rung.normalisation_relative_error.map_or_else(String::new, |e| format!(" ({})", percent(e)));
-    // Of nothing found, the bound.
-    let sign = if rung.normalisation > 0.0 { "" } else { "< " };
+    let error = match rung.normalisation_error {
+        // That of rung 0 is 1 by definition.
+        0.0 => "-".to_owned(),
+        error if rung.normalisation > 0.0 => format!("{error:.1e}{relative}"),
+        bound => format!("< {bound:.1e}"),
+    };
     vec![
         name.to_owned(),
         percent(rung.share),
@@ -58,6 +62,6 @@ fn row(name: &str, rung: &RungReport) -> Vec<String> {
         or_dash(rung.target_effective, |v| format!("{v:.0}")),
         or_dash(rung.r_hat, |v| format!("{v:.3}")),
         format!("{:.4e}", rung.normalisation),
-        format!("{sign}{:.1e}{relative}", rung.normalisation_error),
+        error,
     ]
 }
