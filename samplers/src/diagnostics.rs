@@ -3,6 +3,9 @@
 pub(crate) mod blocks;
 pub(crate) mod dispersion;
 pub(crate) mod rhat;
+mod warnings;
+
+pub use warnings::{AGREEING_R_HAT, KNOWN_NORMALISATION, USEFUL_EXCHANGE_RATES, Warning, warnings};
 
 use serde::{Deserialize, Serialize};
 
@@ -64,7 +67,9 @@ pub struct RungReport {
     pub ratio_effective: Option<f64>,
     /// Rank-normalised split R-hat over ensembles of the trace below, the larger of bulk and folded \[VEHTARI21\]; last draw.
     pub r_hat: Option<f64>,
-    /// Thinned series of the logarithm of the last rung's target, one an ensemble, at most [`TRACE_POINTS`] points; last draw.
+    /// Thinned series of the logarithm of the last rung's target, one an ensemble, at most [`TRACE_POINTS`] points; last draw. Files that
+    /// keep a report leave them out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub traces: Vec<Vec<f32>>,
     /// Steps of this rung between two points of a trace.
     pub trace_stride: u64,

@@ -11,7 +11,7 @@ pub mod sampler;
 mod state;
 pub mod stream;
 
-pub use diagnostics::{LadderReport, RungReport, TRACE_POINTS};
+pub use diagnostics::{LadderReport, RungReport, TRACE_POINTS, Warning, warnings};
 pub use ladder::{Allocation, Combine, Ladder, LadderSettings, Normaliser};
 pub use sampler::{CELLS, Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
 pub use stream::{Key, Purpose, Recorder, Replay, Stream, UniformStream};

@@ -1,9 +1,11 @@
 //! `isophote info FILE.exr|SCENE.xml`.
 
+use super::diagnose::table::numbers;
 use super::failure::{Failure, Outcome};
 use super::output::{bytes, print, print_json};
 use super::scene::{self, SceneChanges};
 use crate::image::exr::{ExrFile, read_file};
+use crate::integrators::chains::ChainReport;
 use crate::scene::bsdf::Bsdf;
 use crate::scene::emitter::Emitter;
 use crate::scene::mitsuba::LoadedScene;
@@ -146,9 +148,25 @@ fn emitter_kind(emitter: &Emitter) -> &'static str {
 /// The document for people: one line an entry, lists and objects indented below their key.
 fn text(document: &Value) -> String {
     let mut out = String::new();
-    if let Value::Object(map) = document {
+    let mut document = document.clone();
+    // What methods tell of themselves is nested deeper than the rest, and has a section of its own.
+    let isophote = document.get_mut("isophote").and_then(Value::as_object_mut);
+    let told = isophote.and_then(|metadata| metadata.shift_remove("diagnostics")).unwrap_or(Value::Null);
+    if let Value::Object(map) = &document {
         for (key, value) in map {
             entry(&mut out, key, value);
+        }
+    }
+    out + &diagnostics(&told)
+}
+
+/// What a method tells of itself: chains as `isophote diagnose` shows them, the rest by key.
+fn diagnostics(told: &Value) -> String {
+    let mut out = String::new();
+    for (key, value) in told.as_object().into_iter().flatten() {
+        match ChainReport::from_json(value) {
+            Some(chains) => out += &format!("{key}\n{}", numbers(&chains)),
+            None => entry(&mut out, key, value),
         }
     }
     out

@@ -3,6 +3,7 @@
 
 mod common;
 mod compare;
+mod diagnose;
 mod failure;
 mod info;
 mod list;
@@ -77,6 +78,7 @@ fn command(methods: &'static [Method]) -> Command {
             study::StudyArgs::augment_args(Command::new("study")).about("Renders scenes by methods by seeds, and goes on where it stopped"),
         )
         .subcommand(report::ReportArgs::augment_args(Command::new("report")).about("One self-contained HTML file from a study's records"))
+        .subcommand(diagnose::command())
         .subcommand(info::InfoArgs::augment_args(Command::new("info")).about("What is in an EXR file or a scene"))
         .subcommand(list::ListArgs::augment_args(Command::new("list")).about("What methods, samplers, materials and metrics there are"))
         .subcommand(Command::new("completions").about("Completions of this command line for a shell").arg(shell))
@@ -89,6 +91,7 @@ fn dispatch(matches: &ArgMatches, methods: &'static [Method], verbosity: Verbosi
         Some(("compare", matches)) => compare::run(&parsed(matches)?),
         Some(("study", matches)) => study::run(&parsed(matches)?, methods, verbosity),
         Some(("report", matches)) => report::run(&parsed(matches)?, verbosity),
+        Some(("diagnose", matches)) => diagnose::run(&parsed(matches)?, verbosity),
         Some(("info", matches)) => info::run(&parsed(matches)?),
         Some(("list", matches)) => list::run(&parsed(matches)?, methods),
         Some(("completions", matches)) => completions(matches, methods),

@@ -2,6 +2,7 @@
 //!
 //! A method is prepared once and then iterated; it knows no loop, no clock and no file (`render` does).
 
+pub mod chains;
 pub mod path;
 pub mod photon_settings;
 pub mod sppm;
@@ -9,6 +10,7 @@ pub mod sppm;
 use crate::image::film::Film;
 use crate::scene::Scene;
 use crate::transport::walk::Tally;
+use chains::ChainReport;
 use clap::{ArgMatches, Args, Command};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -78,8 +80,12 @@ pub trait Integrator: Send {
     fn stateless(&self) -> bool {
         true
     }
-    /// What the method can say about itself so far, as it stands in metadata and records.
+    /// What the method can say about itself so far, as it stands in metadata and records: nothing that depends on time or threads.
     fn diagnostics(&self) -> Option<serde_json::Value> {
+        None
+    }
+    /// What the sampler of light paths tells of its chains, if it has any.
+    fn chains(&self) -> Option<ChainReport> {
         None
     }
 }

@@ -17,9 +17,9 @@ pub enum SamplerName {
     Visibility,
     /// Replica exchange up to visibility over kernel size
     Kernel,
-    /// Replica exchange up to equal relative error, densities kept over the image (Gruson et al. 2016)
+    /// Replica exchange up to equal relative error, densities kept over the image
     Image,
-    /// The same, densities kept over space
+    /// Replica exchange up to equal relative error, densities kept over space (Gruson et al. 2016)
     Spatial,
 }
 

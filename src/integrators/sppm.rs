@@ -11,6 +11,7 @@ mod aimed;
 mod eye;
 mod uniform;
 
+use super::chains::ChainReport;
 use super::photon_settings::{GlossyPaths, PhotonSettings};
 use super::{Common, Integrator, IterationStats, MethodError, Settings};
 use crate::image::film::Film;
@@ -164,8 +165,12 @@ impl Integrator for Sppm<'_> {
             });
         }
         if let Some(aimed) = &self.aimed {
-            document["sampler"] = aimed.report();
+            document["sampler"] = aimed.report().to_json();
         }
         document.as_object().is_some_and(|map| !map.is_empty()).then_some(document)
+    }
+
+    fn chains(&self) -> Option<ChainReport> {
+        self.aimed.as_ref().map(Aimed::report)
     }
 }

@@ -89,6 +89,9 @@ pub struct Metadata {
     pub rejected: BTreeMap<String, u64>,
     /// Error against the reference on the way.
     pub errors: Vec<ErrorRecord>,
+    /// What the method tells of itself, by its own keys; `null` if it has nothing to tell.
+    #[serde(default)]
+    pub diagnostics: Option<Value>,
 }
 
 impl Metadata {
@@ -110,6 +113,7 @@ impl Metadata {
             rays: 0,
             rejected: BTreeMap::new(),
             errors: Vec::new(),
+            diagnostics: None,
         }
     }
 }
@@ -129,8 +133,8 @@ mod tests {
         metadata.radius = Some(0.1 + 0.2);
         let value = serde_json::to_value(&metadata).expect("JSON");
         let keys: Vec<&str> = value.as_object().expect("an object").keys().map(String::as_str).collect();
-        let expected =
-            "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected errors";
+        let expected = "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected \
+                        errors diagnostics";
         assert_eq!(keys.join(" "), expected);
         assert!(value["errors"][0]["relmse_trimmed"].is_number() && value["errors"][0].get("masked").is_none());
         let back: Metadata = serde_json::from_str(&value.to_string()).expect("metadata");

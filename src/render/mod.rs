@@ -2,6 +2,7 @@
 
 pub mod budget;
 pub mod clock;
+pub mod diagnose;
 pub mod metadata;
 pub mod progress;
 pub mod run;
@@ -10,6 +11,7 @@ pub mod snapshots;
 
 pub use budget::{Budget, IterationRange};
 pub use clock::{Interrupt, RenderClock};
+pub use diagnose::{Diagnosis, diagnose};
 pub use metadata::{ErrorRecord, Metadata, Run, SceneRecord};
 pub use progress::{Bar, Lines, Progress, Silent, Step};
 pub use run::{Layers, Outcome, Output, Plan, Reference, RenderError, render};

@@ -167,9 +167,10 @@ pub fn render(
     let mut session = Session { plan, film, metadata, snapshots: Vec::new(), clock, stats, done: 0 };
     let result = session.iterate(method, progress, interrupt);
     progress.finish();
-    let saved = if session.done > 0 { session.record().and_then(|()| session.save(&plan.output.path)) } else { Ok(()) };
+    let saved = if session.done > 0 { session.record().and_then(|()| session.save(method, &plan.output.path)) } else { Ok(()) };
     let interrupted = result?;
     saved?;
+    session.warn(method);
     let non_finite = session.film.mean().iter().filter(|p| !p.is_finite()).count() as u64;
     Ok(Outcome { film: session.film, metadata: session.metadata, snapshots: session.snapshots, non_finite, interrupted })
 }
@@ -217,9 +218,9 @@ impl Session<'_> {
             self.stats.add(&stats);
             self.done += 1;
             progress.step(self.step());
-            self.keep()?;
+            self.keep(method)?;
             if self.plan.checkpoint.is_some_and(|every| last_save.elapsed() >= every) {
-                if let Err(error) = self.save(&self.plan.output.path.clone()) {
+                if let Err(error) = self.save(method, &self.plan.output.path) {
                     // The render can still end well; only the insurance is missing.
                     tracing::warn!("checkpoint not written: {error}");
                 }
@@ -230,11 +231,11 @@ impl Session<'_> {
     }
 
     /// A snapshot and an error record, where they are due.
-    fn keep(&mut self) -> Result<(), RenderError> {
+    fn keep(&mut self, method: &dyn Integrator) -> Result<(), RenderError> {
         if self.plan.snapshots.due(self.done) {
             self.record()?;
             if self.plan.keep {
-                self.save(&Snapshots::path(&self.plan.output.path, self.done))?;
+                self.save(method, &Snapshots::path(&self.plan.output.path, self.done))?;
             }
         }
         Ok(())
@@ -270,7 +271,7 @@ impl Session<'_> {
     }
 
     /// Writes the film as it stands.
-    fn save(&mut self, path: &Path) -> Result<(), RenderError> {
+    fn save(&mut self, method: &dyn Integrator, path: &Path) -> Result<(), RenderError> {
         let start = self.plan.budget.iterations.start;
         let metadata = &mut self.metadata;
         metadata.runs = vec![Run { seed: self.plan.seed, ranges: vec![[start, start + self.done]] }];
@@ -281,7 +282,16 @@ impl Session<'_> {
         metadata.camera_paths = self.stats.camera_paths;
         metadata.rays = self.stats.rays;
         metadata.rejected = self.stats.rejected.iter().map(|(cause, count)| (cause.to_string(), *count)).collect();
+        metadata.diagnostics = method.diagnostics();
         Ok(self.plan.output.write(path, &self.film, &self.metadata)?)
+    }
+
+    /// Tells of chains that make the image wrong; what only makes it noisier is for those who ask.
+    fn warn(&self, method: &dyn Integrator) {
+        let Some(chains) = method.chains() else { return };
+        for warning in chains.warnings().iter().filter(|warning| warning.severe()) {
+            tracing::warn!("{} on {}: {}", self.metadata.method, self.metadata.scene.path, chains.words(warning));
+        }
     }
 
     /// Whether the time or the light paths are used up.

@@ -8,7 +8,7 @@ use isophote::math::Rgb;
 #[test]
 fn every_command_and_method_has_help() {
     let bench = Bench::new();
-    for command in ["render", "compare", "info", "list", "completions"] {
+    for command in ["render", "compare", "diagnose", "info", "list", "completions"] {
         assert!(bench.succeed(&[command, "--help"]).contains("Usage"), "{command}");
         assert!(bench.succeed(&["--help"]).contains(command));
     }
@@ -165,6 +165,7 @@ fn the_documented_examples_have_the_keys_that_are_printed() {
     std::fs::write(bench.path("s.toml"), study).unwrap();
     let printed = [
         rendered,
+        bench.json(&["diagnose", "lamp/scene.xml", "--sampler", "image", "--iterations", "1", "--json", "-q"]),
         bench.json(&["compare", "a.exr", "a.exr", "--json"]),
         bench.json(&["reference", "path", "lamp/scene.xml", "--runs", "2", "--iterations", "1", "-o", "ref", "--json", "-q"]),
         bench.json(&["study", "s.toml", "--json", "-q"]),
@@ -184,6 +185,12 @@ fn the_documented_examples_have_the_keys_that_are_printed() {
         }
     }
     for part in ["defaults", "counts", "memory", "film", "bounds"] {
-        assert_eq!(keys(&examples[5][part]), keys(&printed[5][part]), "{part}");
+        assert_eq!(keys(&examples[6][part]), keys(&printed[6][part]), "{part}");
+    }
+    let sampler = |documents: &[serde_json::Value]| documents[1]["sampler"].clone();
+    let (example, printed) = (sampler(&examples), sampler(&printed));
+    assert_eq!(keys(&example), keys(&printed));
+    for part in ["/rungs/1", "/regions"] {
+        assert_eq!(keys(example.pointer(part).unwrap()), keys(printed.pointer(part).unwrap()), "{part}");
     }
 }

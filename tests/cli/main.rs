@@ -5,6 +5,7 @@
 
 mod bench;
 mod commands;
+mod diagnose;
 mod mistakes;
 mod renders;
 #[cfg(unix)]

@@ -83,3 +83,27 @@ fn input_that_is_bad_is_told_with_its_name() {
     }
     assert_eq!(bench.files(), before);
 }
+
+#[test]
+fn options_of_samplers_that_contradict_each_other_are_told() {
+    let bench = Bench::new();
+    let mistakes: &[(&[&str], &str)] = &[
+        (&["--sampler", "visibility", "--rungs", "uniform,visibility"], "--rungs needs --sampler kernel, image or spatial"),
+        (&["--sampler", "uniform", "--combine", "last"], "give --sampler visibility, kernel, image or spatial"),
+        (&["--sampler", "spatial", "--rungs", "uniform,target,kernel"], "in the order visibility, kernel, target"),
+        (&["--sampler", "spatial", "--rungs", "visibility,target"], "must begin with uniform"),
+        (&["--sampler", "kernel", "--normaliser", "pooled"], "needs --alpha 1"),
+        (&["--sampler", "kernel", "--normaliser", "pooled", "--alpha", "0.99"], "with alpha 0.99 the radius shrinks"),
+        (&["--sampler", "kernel", "--acceptance", "1"], "--acceptance must lie in (0, 1)"),
+        (&["--sampler", "metropolis"], "[possible values: uniform, visibility, kernel, image, spatial]"),
+        (&["--sampler", "spatial", "--rungs", "uniform,full"], "full"),
+        (&["--sampler", "spatial", "--ensembles", "1"], "2..=4096"),
+    ];
+    for (options, expected) in mistakes {
+        for command in [&["render", "sppm", "lamp/scene.xml"][..], &["diagnose", "lamp/scene.xml"]] {
+            let told = refused(&bench, &[command, options].concat());
+            assert!(told.contains(expected), "{command:?} {options:?}: {told}");
+        }
+    }
+    assert!(bench.files().is_empty(), "{:?}", bench.files());
+}

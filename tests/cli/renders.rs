@@ -14,8 +14,8 @@ fn the_image_goes_to_the_folders_name_with_all_metadata() {
         let file = format!("lamp.{}.exr", method.name);
         assert_eq!(statistics["output"], file);
         let metadata = bench.metadata(&file);
-        let keys =
-            "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected errors";
+        let keys = "schema version scene method settings radius runs seconds cpu_seconds threads light_paths camera_paths rays rejected errors \
+             diagnostics";
         for key in keys.split_whitespace() {
             assert!(metadata.get(key).is_some() && statistics[key] == metadata[key], "{}: {key}", method.name);
         }

@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, text};
 use isophote::integrators::METHODS;
+use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -51,4 +52,20 @@ fn the_old_image_stays_until_the_new_one_is_whole() {
         let file = bench.path("a.exr");
         assert!(isophote::image::exr::read_picture(&file).is_ok(), "{} after {delay} ms", text(&file));
     }
+}
+
+#[test]
+fn a_diagnosis_that_is_interrupted_tells_what_there_is() {
+    let bench = Bench::new();
+    let arguments = ["diagnose", "lamp/scene.xml", "--sampler", "visibility", "--photons", "20000", "--time", "600"];
+    let mut child = bench.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // The first line on iterations shows that there is something to tell.
+    let mut told = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(told.any(|line| line.unwrap().contains("iterations,")), "ended by itself");
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    std::thread::spawn(move || told.for_each(drop));
+    let output = child.wait_with_output().unwrap();
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{table}");
+    assert!(table.contains("round trips") && table.contains("visibility"), "{table}");
 }

@@ -2,6 +2,7 @@
 //!
 //! [STF, algorithm 1]: measurement points, targets at them, light paths by replica exchange, statistics of regions.
 
+use super::super::chains::{ChainReport, RegionReport};
 use super::super::photon_settings::{LadderPlan, PhotonSettings, RegionKind};
 use super::{Eye, Glossy, IterationStats, Radius, Sppm};
 use crate::image::film::Film;
@@ -16,7 +17,6 @@ use crate::targets::regions::Regions;
 use crate::targets::tallies::Tallies;
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
 /// Camera paths a pixel in the pilot that the regions are built over [STF 4.2].
 const PILOT: u64 = 4;
@@ -71,7 +71,6 @@ impl Aimed {
         let draw = self.ladder.draw(&space, i, paths, start, |deposits, path, drawn| deposits.add(&points, path, drawn));
         stats.light_paths += draw.traced;
         stats.count(&tallies.total());
-        self.tell(i);
         draw.batches.iter().for_each(|deposits| stats.count(&deposits.tally));
         let (sums, halves) = collect(&draw, count);
 
@@ -94,35 +93,10 @@ impl Aimed {
         glossy
     }
 
-    /// A line a rung for those who ask.
-    fn tell(&self, i: u64) {
-        if !tracing::enabled!(tracing::Level::DEBUG) {
-            return;
-        }
-        for (name, rung) in self.rungs.iter().zip(self.ladder.report().rungs) {
-            tracing::debug!(
-                "iteration {i}, {name:?}: share {:.3} then {:.3}, accepted {:.3} and {:.3}, step {:.4}, dispersion {:.2}, b {:.5} +- {:.5}, exchanged {:.3}",
-                rung.share,
-                rung.next_share,
-                rung.acceptance.unwrap_or(f64::NAN),
-                rung.redraw_acceptance.unwrap_or(f64::NAN),
-                rung.step_size.unwrap_or(f64::NAN),
-                rung.dispersion,
-                rung.normalisation,
-                rung.normalisation_error,
-                rung.exchange_rate.unwrap_or(f64::NAN)
-            );
-        }
-    }
-
     /// The ladder's diagnostics and the number of regions.
-    pub(super) fn report(&self) -> Value {
-        let mut report = json!(self.ladder.report());
-        report["rung_names"] = json!(self.rungs);
-        if let Some(regions) = &self.aimer.regions {
-            report["regions"] = json!({ "leaves": regions.leaves(), "in_use": self.aimer.region_count() });
-        }
-        report
+    pub(super) fn report(&self) -> ChainReport {
+        let report = |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.region_count() };
+        ChainReport { names: self.rungs.clone(), ladder: self.ladder.report(), regions: self.aimer.regions.as_ref().map(report) }
     }
 }
 

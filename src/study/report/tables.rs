@@ -235,6 +235,16 @@ fn flatten(path: &str, value: &Value, out: &mut Vec<(String, String)>) {
                 flatten(&if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, inner, out);
             }
         }
+        // A list of things with names, such as the rungs of a ladder: a line each.
+        Value::Array(list) if list.iter().any(Value::is_object) => {
+            for (index, inner) in list.iter().enumerate() {
+                let name = inner.get("name").and_then(Value::as_str).map_or_else(|| index.to_string(), str::to_owned);
+                let mut parts = Vec::new();
+                flatten("", inner, &mut parts);
+                let told = parts.iter().filter(|(key, _)| key != "name").map(|(key, value)| format!("{key} {value}"));
+                out.push((format!("{path}.{name}"), told.collect::<Vec<_>>().join(", ")));
+            }
+        }
         Value::Array(list) => out.push((path.to_string(), list.iter().map(scalar).collect::<Vec<_>>().join(", "))),
         other => out.push((path.to_string(), scalar(other))),
     }

@@ -143,6 +143,7 @@ fn fill(record: &mut CellRecord, outcome: Outcome, image: &Path, keep: Keep) {
     record.camera_paths = metadata.camera_paths;
     record.rays = metadata.rays;
     record.rejected = metadata.rejected;
+    record.diagnostics = metadata.diagnostics;
     record.image = Some(image.to_path_buf());
     let snapshot_record = |snapshot: Snapshot| SnapshotRecord {
         image: image_at(snapshot.iteration),
