@@ -199,7 +199,7 @@ def canyon():
     noise = (noise + 0.5 * (np.roll(noise, 1, 0) + np.roll(noise, 1, 1))) / 1.5
     points = np.zeros((len(depths), len(across), 3))
     for i, d in enumerate(depths):
-        half = 0.85 + 0.045 * max(d, 0)
+        half = 2 + 0.045 * max(d, 0)
         middle = 0.55 * half * math.sin(2.2 * math.log(1 + max(d, 0) / 2.5)) - 0.1
         for j, t in enumerate(across):
             a, s = abs(t), math.copysign(1, t)
@@ -227,9 +227,9 @@ def canyon():
         count = 0
         for k in range(27):
             d = 1.2 * (260 / 1.2) ** (k / 25)
-            half = 0.85 + 0.045 * d
+            half = 2 + 0.045 * d
             x = 0.55 * half * math.sin(2.2 * math.log(1 + d / 2.5)) - 0.1 + half * rng.uniform(-0.75, 0.75)
-            r = half * rng.uniform(0.08, 0.2)
+            r = min(half * rng.uniform(0.08, 0.2), 0.17 * d)
             if k == 26:  # the nearest one
                 x, r, d = -0.42, 0.2, 0.62
             grid = []
