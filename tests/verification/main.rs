@@ -52,16 +52,29 @@ against_shared! {
     path_on_veach_mis: "veach-mis", 256;
 }
 
+/// The scenes of this repository that have a reference, and iterations a run.
+const OWN_SCENES: [(&str, u64); 9] = [
+    ("box", 256),
+    ("glass-box", 256),
+    ("furnace", 256),
+    ("textured-room", 256),
+    ("hall", 128),
+    ("villa", 128),
+    ("canyon", 64),
+    ("pool", 256),
+    ("balls", 128),
+];
+
 /// Every scene of this repository that has a reference: `path` agrees with Mitsuba.
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn path_on_own_scenes() {
     let mut failures = Vec::new();
-    for name in ["box", "glass-box", "furnace", "textured-room"] {
+    for (name, iterations) in OWN_SCENES {
         let folder = root().join("scenes").join(name);
         let expected = reference(&folder.join("reference/reference"), 16);
         let scene = load_file(&folder.join("scene.xml"), Some((expected.width as u32, expected.height as u32)));
-        let images = runs(&scene, "path", "{}", &common(0, scene.defaults.max_depth), 256, 16);
+        let images = runs(&scene, "path", "{}", &common(0, scene.defaults.max_depth), iterations, 16);
         let report = TileTest { block: 16, family: 0.01, cut: 0.0 }.run(&images, &expected);
         eprintln!("path {name}: {}", report.describe());
         if !report.passed() {
