@@ -6,6 +6,7 @@
 //! several of them at once.
 
 mod block;
+mod diffuse;
 mod follow;
 
 use super::{Common, Integrator, IterationStats, MethodError, Settings};
@@ -17,14 +18,14 @@ use crate::scene::bsdf::Mode;
 use crate::scene::emitter::EmitterKind;
 use crate::scene::hit::Hit;
 use crate::scene::ray::Ray;
-use crate::transport::shading::SurfacePoint;
+use crate::transport::shading::{SurfacePoint, sides_agree};
 use crate::transport::walk::{CEILING, Tally, beyond_emitters};
 use block::{Arrival, Block, Unshadowed, Walk};
 use clap::Args;
 use follow::{AnyClass, Follow, Matching};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
+use std::ops::{Add, Div, Mul, Range};
 
 /// Paths that advance together.
 const BLOCK: usize = 256;
@@ -64,10 +65,10 @@ impl Integrator for Path<'_> {
 
 /// Power heuristic with exponent 2 for one sample of each technique [VEACH 9.2]: the weight of the technique whose density is `a`.
 #[inline(always)]
-fn power_heuristic(a: f32, b: f32) -> f32 {
+fn power_heuristic<T: Copy + From<f32> + Add<Output = T> + Mul<Output = T> + Div<Output = T>>(a: T, b: T) -> T {
     // As a ratio: squares of large densities overflow.
     let ratio = b / a;
-    1.0 / (1.0 + ratio * ratio)
+    T::from(1.0) / (T::from(1.0) + ratio * ratio)
 }
 
 impl<'a> Path<'a> {
@@ -114,6 +115,7 @@ impl<'a> Path<'a> {
         tally.rays += block.rays.len() as u64;
         self.scene.trace_each(&block.rays, &mut block.hits);
         self.arrive(depth, block, radiances, tally);
+        block.diffuse.look_up();
         self.find_light(depth, block, radiances, tally);
         self.scatter(depth, block);
         self.scene.occluded_each(&block.shadow_rays, &mut block.blocked);
@@ -124,9 +126,12 @@ impl<'a> Path<'a> {
 
     /// Adds the emission that paths meet, and finds the surfaces from which they may go on.
     fn arrive<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>, radiances: &mut [Rgb], tally: &mut Tally) {
-        let Block { walks, live, rays, hits, arrivals, .. } = block;
+        let Block { walks, live, rays, hits, arrivals, diffuse, .. } = block;
         let last = Some(depth) == self.common.max_depth;
+        let in_eights = F::EVERY && self.scene.lights_by_area();
+        let roulette = depth >= self.common.rr_depth;
         arrivals.clear();
+        diffuse.clear();
         for ((&number, ray), hit) in live.iter().zip(rays.iter()).zip(hits.iter()) {
             if last && hit.is_some_and(|raw| !self.scene.shines(&raw)) {
                 continue;
@@ -137,7 +142,17 @@ impl<'a> Path<'a> {
                 radiances[number as usize] += emission;
             }
             let Some(hit) = hit.filter(|_| !last) else { continue };
-            let Some(point) = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d) else {
+            let bsdf = self.scene.bsdf(hit.shape);
+            let z = -ray.d.dot(hit.frame.n);
+            if in_eights && let Some((texture, side)) = bsdf.as_diffuse(z) {
+                if !sides_agree(-ray.d, hit.end.n_g, hit.frame.n) {
+                    tally.sides_disagree += 1;
+                } else if z * side > 0.0 {
+                    diffuse.push((number, walk), &hit, (texture, side), roulette, |u_pick, u| self.scene.sample_light_point(u_pick, u));
+                }
+                continue;
+            }
+            let Some(point) = SurfacePoint::new(&hit, bsdf, ray.d) else {
                 tally.sides_disagree += 1;
                 continue;
             };
@@ -165,9 +180,20 @@ impl<'a> Path<'a> {
 
     /// Next event estimation: a light sample for every surface point, and the ray that tells whether it counts.
     fn find_light<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>, radiances: &mut [Rgb], tally: &mut Tally) {
-        let Block { walks, arrivals, lights, shadow_rays, .. } = block;
+        let Block { walks, arrivals, diffuse, lights, shadow_rays, .. } = block;
         lights.clear();
         shadow_rays.clear();
+        if depth + 1 >= self.common.min_depth {
+            diffuse.find_light(|light, ray| {
+                tally.rays += 1;
+                if ray.d == Vec3::ZERO {
+                    radiances[light.walk as usize] += light.value;
+                } else {
+                    lights.push(light);
+                    shadow_rays.push(ray);
+                }
+            });
+        }
         for &Arrival { walk: number, ref point } in arrivals.iter() {
             let walk = &mut walks[number as usize];
             let u_emitter = walk.stream.next_1d();
@@ -197,9 +223,10 @@ impl<'a> Path<'a> {
 
     /// BSDF sampling and Russian roulette: the next ray of every path that goes on.
     fn scatter<F: Follow>(&self, depth: u32, block: &mut Block<'a, F>) {
-        let Block { walks, live, rays, arrivals, .. } = block;
+        let Block { walks, live, rays, arrivals, diffuse, .. } = block;
         live.clear();
         rays.clear();
+        diffuse.scatter(depth >= self.common.rr_depth, walks, live, rays);
         for &Arrival { walk: number, ref point } in arrivals.iter() {
             let walk = &mut walks[number as usize];
             let u_lobe = walk.stream.next_1d();
