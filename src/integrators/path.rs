@@ -1,8 +1,8 @@
 //! Path tracing: next event estimation and BSDF sampling joined by the power heuristic [VEACH 9.2]. The oracle of all other methods:
 //! it shares the scene and the rule for shading normals with them, and no random walk, no photon, no recursive weight.
 //!
-//! A block of pixels advances together, one edge at a time: all rays of the block are traced, then every path that met something is
-//! shaded, then all rays to lights are traced. No path knows of another; the block is there for the processor, which works on
+//! A tile of pixels advances together, one edge at a time: all rays of the tile are traced, then every path that met something is
+//! shaded, then all rays to lights are traced. No path knows of another; the tile is there for the processor, which works on
 //! several of them at once.
 
 mod block;
@@ -25,10 +25,10 @@ use clap::Args;
 use follow::{AnyClass, Follow, Matching};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
-use std::ops::{Add, Div, Mul, Range};
+use std::ops::{Add, Div, Mul};
 
-/// Paths that advance together.
-const BLOCK: usize = 256;
+/// Width and height, in pixels, of the tile whose paths advance together.
+const TILE: [usize; 2] = [32, 8];
 
 /// The path tracer has no settings of its own.
 #[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
@@ -37,7 +37,7 @@ pub struct PathSettings {}
 
 impl Settings for PathSettings {
     fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
-        Ok(Box::new(Path { scene, width: size.0, common: common.clone(), block: BLOCK }))
+        Ok(Box::new(Path { scene, width: size.0, common: common.clone(), tile: TILE }))
     }
 }
 
@@ -45,8 +45,8 @@ struct Path<'a> {
     scene: &'a Scene,
     width: usize,
     common: Common,
-    /// Most paths that advance together; nothing but speed depends on it.
-    block: usize,
+    /// Width and height of the tile whose paths advance together; nothing but speed depends on it.
+    tile: [usize; 2],
 }
 
 impl Integrator for Path<'_> {
@@ -75,7 +75,7 @@ impl<'a> Path<'a> {
     /// One sample a pixel; `eye` is the class of a path that has only begun.
     fn sample_pixels<F: Follow>(&self, i: u64, film: &mut Film, eye: &F) -> IterationStats {
         let mut stats = IterationStats { camera_paths: (film.width() * film.height()) as u64, ..Default::default() };
-        let sample = |block: &mut Block<'a, F>, pixels: Range<usize>, radiances: &mut [Rgb]| {
+        let sample = |block: &mut Block<'a, F>, pixels: &[usize], radiances: &mut [Rgb]| {
             let mut tally = Tally::default();
             self.start(i, pixels, eye, block, &mut tally);
             radiances.fill(Rgb::BLACK);
@@ -88,14 +88,15 @@ impl<'a> Path<'a> {
             radiances.iter_mut().for_each(|radiance| *radiance = tally.finite(*radiance));
             tally
         };
-        film.add_eye_blocks(self.block, || Block::new(self.block), sample, |tally| stats.count(&tally));
+        let paths = self.tile[0] * self.tile[1];
+        film.add_eye_tiles(self.tile, || Block::new(paths), sample, |tally| stats.count(&tally));
         stats
     }
 
     /// Fills the block with a random camera ray through each of these pixels.
-    fn start<F: Follow>(&self, i: u64, pixels: Range<usize>, eye: &F, block: &mut Block<'a, F>, tally: &mut Tally) {
+    fn start<F: Follow>(&self, i: u64, pixels: &[usize], eye: &F, block: &mut Block<'a, F>, tally: &mut Tally) {
         block.clear();
-        for pixel in pixels {
+        for &pixel in pixels {
             let (x, y) = (pixel % self.width, pixel / self.width);
             let mut stream = Key { seed: self.common.seed, iteration: i, index: pixel as u64, purpose: Purpose::Camera }.stream();
             let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
@@ -258,18 +259,18 @@ mod tests {
     use super::*;
     use crate::scene::mitsuba::{LoadOptions, load};
 
-    /// Blocks are there for speed: neither the picture nor the counts depend on their width, whether or not it divides the film's.
+    /// Tiles are there for speed: neither the picture nor the counts depend on their size, whether or not it divides the film's.
     #[test]
-    fn blocks_of_any_width_give_the_same_bits() {
+    fn tiles_of_any_size_give_the_same_bits() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bench/cornell-box/scene.xml");
         let (width, height) = (19, 7);
         let loaded = load(&file, &LoadOptions { resolution: Some((width as u32, height as u32)), ..Default::default() }).unwrap();
         let pattern = crate::transport::class::pattern("LDD?E").unwrap();
         for paths in [None, Some(pattern)] {
             let common = Common { seed: 5, max_depth: Some(6), min_depth: 2, rr_depth: 3, hide_emitters: true, paths };
-            let render = |block: usize| {
+            let render = |tile: [usize; 2]| {
                 let mut film = Film::new(width, height, true);
-                let mut path = Path { scene: &loaded.scene, width, common: common.clone(), block };
+                let mut path = Path { scene: &loaded.scene, width, common: common.clone(), tile };
                 let mut stats = IterationStats::default();
                 for i in 0..3 {
                     stats.add(&path.iterate(i, &mut film));
@@ -277,10 +278,10 @@ mod tests {
                 }
                 (film, stats)
             };
-            let one = render(1);
+            let one = render([1, 1]);
             assert!(one.0.mean().iter().any(|c| !c.is_black()));
-            for block in [2, 16, 100, width * height, 256] {
-                assert!(render(block) == one, "blocks of {block}");
+            for tile in [[2, 1], [1, 3], [5, 2], [width, height], [32, 8]] {
+                assert!(render(tile) == one, "tiles of {tile:?}");
             }
         }
     }

@@ -161,9 +161,10 @@ impl<const K: usize> Packet<K> {
     #[cold]
     #[inline(never)]
     fn exactly(&self, leaf: &Tri4, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
+        let plane = leaf.plane(n);
         for lane in lanes(mask) {
             let t = &mut t.as_mut_array()[lane];
-            *t = leaf.exactly(self.origin(lane), self.direction(lane), n, *t);
+            *t = plane.exactly(self.origin(lane), self.direction(lane), *t);
         }
         t
     }

@@ -173,14 +173,33 @@ impl Tri4 {
     /// by a few ulp must not see it again, and must not miss the neighbour in a corner either.
     #[cold]
     #[inline(never)]
-    pub(super) fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
+    fn exactly(&self, o: Vec3, d: Vec3, lane: usize, t: f32) -> f32 {
+        self.plane(lane).exactly(o, d, t)
+    }
+
+    /// The plane of the triangle in a lane.
+    #[inline(always)]
+    pub(super) fn plane(&self, lane: usize) -> Plane {
         let a = self.at(0, lane);
-        let n = (self.at(1, lane) - a).cross(self.at(2, lane) - a);
-        let along = n.dot(d.as_dvec3());
+        Plane { a, n: (self.at(1, lane) - a).cross(self.at(2, lane) - a) }
+    }
+}
+
+/// A triangle's plane, in f64.
+pub(super) struct Plane {
+    a: DVec3,
+    n: DVec3,
+}
+
+impl Plane {
+    /// See [`Tri4::exactly`].
+    #[inline(always)]
+    pub(super) fn exactly(&self, o: Vec3, d: Vec3, t: f32) -> f32 {
+        let along = self.n.dot(d.as_dvec3());
         if along == 0.0 {
             return t;
         }
-        let ahead = n.dot(a - o.as_dvec3());
+        let ahead = self.n.dot(self.a - o.as_dvec3());
         // Most often the ray leaves this triangle: that needs no quotient.
         if (ahead > 0.0) != (along > 0.0) { 0.0 } else { (ahead / along) as f32 }
     }
