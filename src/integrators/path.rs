@@ -257,6 +257,7 @@ impl<'a> Path<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::bsdf::Lobes;
     use crate::scene::mitsuba::{LoadOptions, load};
 
     /// Tiles are there for speed: neither the picture nor the counts depend on their size, whether or not it divides the film's.
@@ -286,12 +287,72 @@ mod tests {
         }
     }
 
+    /// Every path counts, but none is done eight at a time.
+    #[derive(Clone)]
+    struct OneByOne;
+
+    impl Follow for OneByOne {
+        const EVERY: bool = false;
+
+        fn choose_lobes<S: Stream>(&mut self, _point: &SurfacePoint<'_>, _stream: &mut S) -> f32 {
+            1.0
+        }
+
+        fn lobes(&self) -> Lobes {
+            Lobes::All
+        }
+
+        fn emission_counts(&self) -> bool {
+            true
+        }
+
+        fn light_counts(&mut self) -> bool {
+            true
+        }
+
+        fn scatter(&mut self, _delta: bool) {}
+    }
+
+    /// Diffuse vertices done eight at a time are those done one by one: pictures and counts, to the bit. Among the scenes are textures, both
+    /// sides, glass, bent normals, lights of many kinds, and one whose lights forbid it.
+    #[test]
+    fn eight_at_a_time_give_the_bits_of_one_by_one() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut by_area = 0;
+        for name in [
+            "tests/bench/cornell-box",
+            "scenes/textured-room",
+            "scenes/glass-box",
+            "tests/scenes/twosided",
+            "tests/scenes/emitter-textured",
+            "tests/scenes/emitter-shapes",
+            "tests/scenes/disk-cylinder",
+            "tests/scenes/obj-normals",
+        ] {
+            let (width, height) = (21, 13);
+            let options = LoadOptions { resolution: Some((width as u32, height as u32)), ..Default::default() };
+            let loaded = load(&root.join(name).join("scene.xml"), &options).unwrap();
+            by_area += usize::from(loaded.scene.lights_by_area());
+            for min_depth in [1, 3] {
+                let common = Common { seed: 5, max_depth: Some(9), min_depth, rr_depth: 3, hide_emitters: false, paths: None };
+                let path = Path { scene: &loaded.scene, width, common, tile: TILE };
+                let (mut eight, mut one) = (Film::new(width, height, false), Film::new(width, height, false));
+                for i in 0..4 {
+                    let counts = path.sample_pixels(i, &mut eight, &AnyClass);
+                    assert_eq!(counts, path.sample_pixels(i, &mut one, &OneByOne), "{name}");
+                }
+                assert!(eight == one, "{name}");
+            }
+        }
+        assert!((4..8).contains(&by_area), "{by_area} scenes whose lights are points by area");
+    }
+
     #[test]
     fn weights_of_two_techniques_sum_to_one() {
-        for (a, b) in [(1.0, 1.0), (1e30, 1e-30), (3e20, 2e20), (0.1, 0.7)] {
+        for (a, b) in [(1.0f32, 1.0), (1e30, 1e-30), (3e20, 2e20), (0.1, 0.7)] {
             assert!((power_heuristic(a, b) + power_heuristic(b, a) - 1.0).abs() < 1e-6);
         }
         // Independent form.
-        assert!((power_heuristic(2.0, 3.0) - 4.0 / 13.0).abs() < 1e-7);
+        assert!((power_heuristic(2.0f32, 3.0) - 4.0 / 13.0).abs() < 1e-7);
     }
 }
