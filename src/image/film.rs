@@ -67,6 +67,16 @@ pub struct RawFilm {
     pub iterations: u64,
 }
 
+/// The pixels of a tile two rows at a time, so that a few in sequence lie close together.
+fn list_tile(columns: Range<usize>, rows: Range<usize>, width: usize, pixels: &mut Vec<usize>) {
+    pixels.clear();
+    for top in rows.clone().step_by(2) {
+        for x in columns.clone() {
+            pixels.extend((top..rows.end.min(top + 2)).map(|y| y * width + x));
+        }
+    }
+}
+
 /// Box-filtered film: every sample lands in exactly one pixel. Row 0 is the top.
 ///
 /// The image is `eye / eye_count + splats / splat_count`. Every sum has one order of its terms, whatever the number of threads.
@@ -118,50 +128,61 @@ impl Film {
         finish_row: impl FnMut(A),
     ) {
         let width = self.sums.width;
-        let row = |(): &mut (), pixels: Range<usize>, values: &mut [Rgb]| {
+        let row = |(): &mut (), pixels: &[usize], values: &mut [Rgb]| {
             let mut state = start();
-            for (pixel, value) in pixels.zip(values) {
+            for (pixel, value) in pixels.iter().zip(values) {
                 *value = sample(&mut state, pixel % width, pixel / width);
             }
             state
         };
-        self.add_eye_blocks(width, || (), row, finish_row);
+        self.add_eye_tiles([width, 1], || (), row, finish_row);
     }
 
-    /// Adds one camera-side sample to every pixel, blocks of pixels in parallel. `sample` is given consecutive pixels by their row-major
-    /// numbers, `block` of them but for the last block, and writes one value for each; what was there before means nothing. What it
-    /// returns goes to `finish_block`, in the blocks' order.
+    /// Adds one camera-side sample to every pixel, tile by tile, rows of tiles in parallel. `sample` is given the row-major numbers of a
+    /// tile's pixels, neighbours near each other, and writes one value for each; what was there before means nothing. What it returns
+    /// goes to `finish_tile`, in the tiles' order. `tile` is width and height.
     ///
-    /// `memory` is called once for each run of blocks that a worker takes, far more rarely than there are blocks; the values must not
-    /// depend on what an earlier block left there.
-    pub fn add_eye_blocks<M, A: Send>(
+    /// `memory` is called once for each run of rows that a worker takes, more rarely than there are tiles; the values must not
+    /// depend on what an earlier tile left there.
+    pub fn add_eye_tiles<M, A: Send>(
         &mut self,
-        block: usize,
+        tile: [usize; 2],
         memory: impl Fn() -> M + Sync,
-        sample: impl Fn(&mut M, Range<usize>, &mut [Rgb]) -> A + Sync,
-        finish_block: impl FnMut(A),
+        sample: impl Fn(&mut M, &[usize], &mut [Rgb]) -> A + Sync,
+        finish_tile: impl FnMut(A),
     ) {
         use rayon::prelude::*;
-        let block = block.max(1);
-        let start = || (memory(), vec![Rgb::BLACK; block]);
-        let fill = |(memory, values): &mut (M, Vec<Rgb>), index: usize, sums: &mut [[f64; 3]], running: &mut [[f64; 3]]| {
-            let first = index * block;
-            let values = &mut values[..sums.len()];
-            let result = sample(memory, first..first + sums.len(), values);
-            let values = || values.iter().map(|value| value.to_array().map(f64::from));
-            sums.iter_mut().zip(values()).for_each(|(sum, value)| add(sum, value));
-            running.iter_mut().zip(values()).for_each(|(sum, value)| add(sum, value));
-            result
+        let [across, down] = tile.map(|side| side.max(1));
+        let width = self.sums.width;
+        let start = || (memory(), Vec::with_capacity(across * down), vec![Rgb::BLACK; across * down]);
+        let fill = |own: &mut (M, Vec<usize>, Vec<Rgb>), index: usize, sums: &mut [[f64; 3]], running: &mut [[f64; 3]]| {
+            let (memory, pixels, values) = own;
+            let first = index * down * width;
+            let one = |left: usize| {
+                list_tile(left..width.min(left + across), first / width..(first + sums.len()) / width, width, pixels);
+                let values = &mut values[..pixels.len()];
+                let result = sample(memory, pixels, values);
+                for (pixel, value) in pixels.iter().zip(values) {
+                    let value = value.to_array().map(f64::from);
+                    add(&mut sums[pixel - first], value);
+                    if let Some(running) = running.get_mut(pixel - first) {
+                        add(running, value);
+                    }
+                }
+                result
+            };
+            (0..width).step_by(across).map(one).collect::<Vec<A>>()
         };
-        let results: Vec<A> = if self.running.is_empty() {
-            let blocks = self.sums.eye.par_chunks_mut(block).enumerate();
-            blocks.map_init(start, |own, (index, sums)| fill(own, index, sums, &mut [])).collect()
+        let rows = (down * width).max(1);
+        let results: Vec<Vec<A>> = if self.running.is_empty() {
+            let bands = self.sums.eye.par_chunks_mut(rows).enumerate();
+            bands.map_init(start, |own, (index, sums)| fill(own, index, sums, &mut [])).collect()
         } else {
-            let pairs = self.sums.eye.par_chunks_mut(block).zip(self.running.par_chunks_mut(block)).enumerate();
+            let pairs = self.sums.eye.par_chunks_mut(rows).zip(self.running.par_chunks_mut(rows)).enumerate();
             pairs.map_init(start, |own, (index, (sums, running))| fill(own, index, sums, running)).collect()
         };
         self.sums.eye_count += 1;
-        results.into_iter().for_each(finish_block);
+        results.into_iter().flatten().for_each(finish_tile);
     }
 
     /// Adds one iteration's splats of `light_paths` light paths: batch after batch, each in its own order, whoever made them. The

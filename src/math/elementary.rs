@@ -1,6 +1,7 @@
 //! Elementary functions where they are needed most: inlined, without calls, tables or branches.
 
 use std::f32::consts::TAU;
+use std::ops::{Add, Mul};
 
 /// Sine and cosine of `u` turns, `u` in [0, 1), each within 1.2e-7 of the truth: nearer than that of the rounded angle `2 pi u`.
 #[inline(always)]
@@ -18,10 +19,11 @@ pub fn sin_cos_turns(u: f32) -> (f32, f32) {
 /// Sine and cosine of an angle in [-pi/4, pi/4], to about one unit in the last place: their series ([AS64 4.3.65, 4.3.66]), cut where the
 /// next term is below half a unit.
 #[inline(always)]
-pub(super) fn sin_cos_eighth(x: f32) -> (f32, f32) {
+pub(super) fn sin_cos_eighth<T: Copy + From<f32> + Add<Output = T> + Mul<Output = T>>(x: T) -> (T, T) {
+    let c = T::from;
     let x2 = x * x;
-    let sin = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5_040.0 + x2 * (1.0 / 362_880.0))));
-    let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
+    let sin = x + x * x2 * (c(-1.0 / 6.0) + x2 * (c(1.0 / 120.0) + x2 * (c(-1.0 / 5_040.0) + x2 * c(1.0 / 362_880.0))));
+    let cos = c(1.0) + x2 * (c(-0.5) + x2 * (c(1.0 / 24.0) + x2 * (c(-1.0 / 720.0) + x2 * c(1.0 / 40_320.0))));
     (sin, cos)
 }
 

@@ -1,6 +1,7 @@
 //! Numbers that know nothing of light: frames, colours, warps beside their densities, distributions, statistics.
 
 pub mod distribution;
+pub mod eight;
 pub mod elementary;
 pub mod frame;
 pub mod measure;

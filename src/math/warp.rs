@@ -23,9 +23,11 @@ pub fn disk(u: Vec2) -> Vec2 {
 #[inline(always)]
 pub fn cosine_hemisphere(u: Vec2) -> Vec3 {
     let d = disk(u);
-    // The floor keeps the direction strictly above the surface, so that its density is positive.
-    d.extend((1.0 - d.length_squared()).max(1e-14).sqrt())
+    d.extend((1.0 - d.length_squared()).max(LOWEST_COSINE2).sqrt())
 }
+
+/// Least square of the cosine of [`cosine_hemisphere`]: it keeps the direction strictly above the surface, so that its density is positive.
+pub(super) const LOWEST_COSINE2: f32 = 1e-14;
 
 /// Density of [`cosine_hemisphere`]; 0 below the surface.
 #[inline(always)]

@@ -9,6 +9,7 @@ mod build;
 mod node;
 mod packet;
 mod probe;
+mod slot;
 mod traverse;
 mod tree;
 mod triangle;
@@ -16,8 +17,7 @@ mod triangle;
 use super::ray::{RawHit, Ray};
 use analytic::Analytic;
 use glam::{Affine3A, Vec3};
-use node::Node;
-use triangle::Tri4;
+use slot::Slot;
 
 /// What the accelerator can intersect. The index in the list is the primitive's number.
 #[derive(Clone, Copy, Debug)]
@@ -81,10 +81,8 @@ pub struct Bounds {
 /// without area, spheres without a positive radius, disks and cylinders whose map is singular. The others keep the
 /// numbers they had in the list.
 pub struct Bvh {
-    /// Inner nodes, each before its descendants, so that a walk goes forward in memory.
-    nodes: Vec<Node>,
-    /// Triangle leaves, in the order the walk meets them.
-    triangles: Vec<Tri4>,
+    /// Inner nodes, each before its descendants, so that a walk goes forward in memory, and leaves of triangles beside their kin.
+    slots: Vec<Slot>,
     /// Leaves of everything that is no triangle, one a leaf.
     analytic: Vec<Analytic>,
     /// How to reach the first node; `node::EMPTY` for no primitives at all.
@@ -118,9 +116,7 @@ impl Bvh {
 
     /// Bytes held, the struct itself not counted.
     pub fn memory(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>()
-            + self.triangles.capacity() * size_of::<Tri4>()
-            + self.analytic.capacity() * size_of::<Analytic>()
+        self.slots.capacity() * size_of::<Slot>() + self.analytic.capacity() * size_of::<Analytic>()
     }
 }
 

@@ -3,7 +3,9 @@
 use super::ray::Ray;
 use super::{EmitterId, ShapeId};
 use crate::math::Frame;
+use crate::math::eight::{Lanes, Vec3x8, copysign};
 use glam::{Vec2, Vec3};
+use wide::f32x8;
 
 /// A point that a ray may start from or end at, with what is known of its rounding error.
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +50,39 @@ impl Endpoint {
         let end = other.toward(self.p - other.p);
         Ray { o, d: end - o, t_max: SEGMENT_END }
     }
+}
+
+/// Eight points like [`Endpoint`], one in each lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Endpoint8 {
+    /// Positions.
+    pub p: Vec3x8,
+    /// Unit geometric normals.
+    pub n_g: Vec3x8,
+    /// Error bounds, none negative.
+    pub offset: f32x8,
+}
+
+impl Endpoint8 {
+    /// [`Endpoint::toward`] of eight, bit for bit.
+    #[inline(always)]
+    pub fn toward(&self, d: Vec3x8) -> Vec3x8 {
+        let away = self.n_g * copysign(self.offset, d.dot(self.n_g));
+        (self.p + away).zip(away, |o, a| o + (copysign(o.abs() * f32x8::splat(f32::EPSILON), a) & a.simd_ne(f32x8::ZERO)))
+    }
+
+    /// [`Endpoint::segment`] of eight, bit for bit: origins and directions. A direction of zero leads nowhere.
+    #[inline(always)]
+    pub fn segment(&self, other: &Endpoint8) -> (Vec3x8, Vec3x8) {
+        let o = self.toward(other.p - self.p);
+        (o, other.toward(self.p - other.p) - o)
+    }
+}
+
+/// The ray in one lane of [`Endpoint8::segment`].
+#[inline(always)]
+pub fn segment_lane((o, d): (&[Lanes; 3], &[Lanes; 3]), lane: usize) -> Ray {
+    Ray { o: Vec3x8::lane(o, lane), d: Vec3x8::lane(d, lane), t_max: SEGMENT_END }
 }
 
 /// Segments stop this short of their end, relative to their length: the far end's own rounding error is covered by its offset,

@@ -17,7 +17,7 @@ use crate::math::Rgb;
 use accel::Accel;
 use bsdf::Bsdf;
 use camera::{Camera, CameraConnection, CameraError, FilmSpec};
-use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterKind, Emitters};
+use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterKind, Emitters, LightPoint};
 use glam::{Vec2, Vec3};
 use hit::{Endpoint, Hit};
 use ray::{RawHit, Ray};
@@ -239,6 +239,19 @@ impl Scene {
     #[inline(always)]
     pub fn sample_direct(&self, from: Vec3, u_pick: f32, u: Vec2) -> Option<DirectSample> {
         self.emitters.sample_direct(&self.surfaces, from, u_pick, u)
+    }
+
+    /// Is every light sample a point uniform by area, so that [`Scene::sample_light_point`] may stand for [`Scene::sample_direct`]?
+    #[inline]
+    pub fn lights_by_area(&self) -> bool {
+        self.emitters.by_area()
+    }
+
+    /// The point that [`Scene::sample_direct`] with the same numbers aims at, wherever it is asked from. `None` where
+    /// [`Scene::lights_by_area`] says no.
+    #[inline(always)]
+    pub fn sample_light_point(&self, u_pick: f32, u: Vec2) -> Option<LightPoint> {
+        self.emitters.sample_point(&self.surfaces, u_pick, u)
     }
 
     /// A ray of light, emitters chosen by power. `None` for a sample that carries nothing, and in a scene without light.

@@ -1,5 +1,6 @@
 //! Memory of the paths that one worker advances together.
 
+use super::diffuse::Diffuse;
 use crate::math::Rgb;
 use crate::samplers::UniformStream;
 use crate::scene::ray::{RawHit, Ray};
@@ -50,6 +51,8 @@ pub(super) struct Block<'a, F> {
     pub(super) hits: Vec<Option<RawHit>>,
     /// Where those paths are that met a surface to go on from.
     pub(super) arrivals: Vec<Arrival<'a>>,
+    /// The others of them, if they are at diffuse surfaces.
+    pub(super) diffuse: Diffuse<'a>,
     /// Light found from there.
     pub(super) lights: Vec<Unshadowed>,
     /// The ray towards each of them.
@@ -67,6 +70,7 @@ impl<F> Block<'_, F> {
             rays: Vec::with_capacity(width),
             hits: vec![None; width],
             arrivals: Vec::with_capacity(width),
+            diffuse: Diffuse::new(width),
             lights: Vec::with_capacity(width),
             shadow_rays: Vec::with_capacity(width),
             blocked: vec![false; width],

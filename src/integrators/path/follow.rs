@@ -8,6 +8,8 @@ use regex::Regex;
 
 /// Watches one path from the eye on.
 pub(super) trait Follow: Clone + Sync {
+    /// Every path counts, through whatever lobes it goes.
+    const EVERY: bool;
     /// Chooses the lobes to go on through at a vertex; the factor on the throughput that makes up for the choice.
     fn choose_lobes<S: Stream>(&mut self, point: &SurfacePoint<'_>, stream: &mut S) -> f32;
     /// The lobes chosen last.
@@ -25,6 +27,8 @@ pub(super) trait Follow: Clone + Sync {
 pub(super) struct AnyClass;
 
 impl Follow for AnyClass {
+    const EVERY: bool = true;
+
     #[inline(always)]
     fn choose_lobes<S: Stream>(&mut self, _point: &SurfacePoint<'_>, _stream: &mut S) -> f32 {
         1.0
@@ -75,6 +79,8 @@ fn letter(lobes: Lobes) -> u8 {
 }
 
 impl Follow for Matching<'_> {
+    const EVERY: bool = false;
+
     fn choose_lobes<S: Stream>(&mut self, point: &SurfacePoint<'_>, stream: &mut S) -> f32 {
         let diffuse = point.bsdf.albedo(point.uv, point.given_local, DIFFUSE);
         let rest = point.bsdf.albedo(point.uv, point.given_local, REST);

@@ -11,8 +11,8 @@ use glam::Vec3;
 /// Rays sorted at once; their numbers fit a byte.
 const BATCH: usize = 256;
 
-/// Leaves of a small tree.
-const SMALL: usize = 48;
+/// Primitives of a small tree.
+pub(super) const SMALL: usize = 160;
 
 /// Rays that make a packet in a small tree.
 const ENOUGH: usize = 3;
@@ -156,7 +156,7 @@ impl Bvh {
     fn each<Q: Question>(&self, rays: &[Ray], answers: &mut [Q::Answer]) {
         let count = rays.len().min(answers.len());
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
-        if self.triangles.len() + self.analytic.len() > SMALL {
+        if self.primitives > SMALL {
             let start = self.bounds.map_or(0.0, |b| (b.max - b.min).max_element()) * START;
             return self.in_turn::<Q>(rays, answers, start);
         }

@@ -38,27 +38,17 @@ pub(super) fn build(primitives: &[Primitive]) -> Bvh {
     }
     analytic.shrink_to_fit();
     let Some(all) = boxes.iter().copied().reduce(union) else {
-        return Bvh {
-            nodes: Vec::new(),
-            triangles: Vec::new(),
-            analytic,
-            root: EMPTY,
-            reach: 0.0,
-            bounds: None,
-            primitives: 0,
-            large: false,
-        };
+        return Bvh { slots: Vec::new(), analytic, root: EMPTY, reach: 0.0, bounds: None, primitives: 0, large: false };
     };
     let mut wide = by_area(&boxes).widen(&items);
     if wide.stack > DEEP {
         // Only a degenerate list gets here; a balanced tree over 2^30 items is 30 deep at most, and 7 * 30 < DEEP.
         wide = by_halves(&boxes).widen(&items);
     }
-    let large = size_of_val(&wide.nodes[..]) + size_of_val(&wide.triangles[..]) > NEAR_CACHE;
+    let large = size_of_val(&wide.slots[..]) > NEAR_CACHE;
     let reach = all.min.abs().max(all.max.abs());
     Bvh {
-        nodes: wide.nodes,
-        triangles: wide.triangles,
+        slots: wide.slots,
         analytic,
         root: wide.root,
         reach: reach.x.max(reach.y).max(reach.z),

@@ -1,14 +1,14 @@
 //! Eight rays side by side, one triangle or one box at a time.
 //!
 //! A single ray asks four triangles at once and spends most of its time finding out where to go next. Eight rays in the lanes of one vector
-//! share that: a box is opened if any of them may meet it. What a lane computes for a triangle is operation for operation what `Tri4`
+//! share that: a box is opened if any of them may meet it. What a lane computes for a triangle is operation for operation what `Tri8`
 //! computes for a ray alone, so the answers are the same bits. Woop's test orders the axes by the ray's largest one; the rays of a packet
 //! share that axis, so that no lane needs an order of its own. `batch.rs` sees to it, and decides whether a packet is worth it.
 
 use super::analytic::Analytic;
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::probe::{FLATTEST, NEXT, PAD};
-use super::triangle::{Best, DOUBTFUL, Tri4};
+use super::triangle::{Best, DOUBTFUL, Tri8};
 use super::{Bvh, DEEP, RawHit, Ray};
 use glam::Vec3;
 use std::cell::Cell;
@@ -112,22 +112,23 @@ impl<const K: usize> Packet<K> {
 
     /// Which rays may meet a child's box before `t_max`, and where each enters.
     #[inline(always)]
-    fn meet(&self, node: &Node, child: usize, t_max: f32x8) -> (f32x8, f32x8) {
-        let slab = |planes: &[f32x8; 2], k: usize| {
-            let lower = f32x8::splat(planes[0].as_array()[child]).mul_add(self.inv[k], self.lower[k]);
-            let upper = f32x8::splat(planes[1].as_array()[child]).mul_add(self.inv[k], self.upper[k]);
+    fn meet(&self, node: Node<'_>, child: usize, t_max: f32x8) -> (f32x8, f32x8) {
+        let slab = |k: usize| {
+            let [lower, upper] = node.planes(k, child);
+            let lower = f32x8::splat(lower).mul_add(self.inv[k], self.lower[k]);
+            let upper = f32x8::splat(upper).mul_add(self.inv[k], self.upper[k]);
             (lower.fast_min(upper), lower.fast_max(upper))
         };
-        let (x, y, z) = (slab(&node.x, 0), slab(&node.y, 1), slab(&node.z, 2));
+        let (x, y, z) = (slab(0), slab(1), slab(2));
         let enter = x.0.fast_max(y.0).fast_max(z.0.fast_max(f32x8::ZERO));
         // Last, since of a NaN and a number the second counts: a ray that is done enters nothing.
         let leave = x.1.fast_min(y.1).fast_min(z.1).fast_min(t_max);
         (enter.simd_le(leave), enter)
     }
 
-    /// Which of the active rays hit triangle `n` of a leaf with `0 < t <= t_max`, and `t`, `u`, `v`: the operations of `Tri4::four`.
+    /// Which of the active rays hit triangle `n` of a leaf with `0 < t <= t_max`, and `t`, `u`, `v`: the operations of `Tri8::eight`.
     #[inline(always)]
-    fn hits(&self, leaf: &Tri4, n: usize, active: f32x8, t_max: f32x8) -> Option<(f32x8, [f32x8; 3])> {
+    fn hits(&self, leaf: Tri8<'_>, n: usize, active: f32x8, t_max: f32x8) -> Option<(f32x8, [f32x8; 3])> {
         let moved = |corner: usize| {
             let at = |k: usize| f32x8::splat(leaf.coordinate(corner, k, n)) + self.minus_o[k];
             let z = at(K);
@@ -160,10 +161,11 @@ impl<const K: usize> Packet<K> {
 
     #[cold]
     #[inline(never)]
-    fn exactly(&self, leaf: &Tri4, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
+    fn exactly(&self, leaf: Tri8<'_>, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
+        let plane = leaf.plane(n);
         for lane in lanes(mask) {
             let t = &mut t.as_mut_array()[lane];
-            *t = leaf.exactly(self.origin(lane), self.direction(lane), n, *t);
+            *t = plane.exactly(self.origin(lane), self.direction(lane), *t);
         }
         t
     }
@@ -183,8 +185,9 @@ impl<const K: usize> Packet<K> {
             }
             loop {
                 if at & LEAF == 0 {
-                    let node = &bvh.nodes[at as usize];
-                    for (i, &child) in node.child.iter().enumerate() {
+                    let node = bvh.node(at);
+                    for i in 0..8 {
+                        let child = node.child(i);
                         if child == EMPTY {
                             break;
                         }
@@ -201,7 +204,7 @@ impl<const K: usize> Packet<K> {
                         top += usize::from(mask.any());
                     }
                 } else if at & ANALYTIC == 0 {
-                    found.leaf(self, active, &bvh.triangles[(at & !LEAF) as usize]);
+                    found.leaf(self, active, bvh.leaf(at));
                 } else {
                     found = found.analytic(self, active, &bvh.analytic[(at & !(LEAF | ANALYTIC)) as usize]);
                 }
@@ -252,7 +255,7 @@ fn lanes(mask: u32) -> impl Iterator<Item = usize> {
 trait Found<const K: usize>: Sized {
     /// How far each ray is still of interest; NaN for one that is done.
     fn until(&self) -> f32x8;
-    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4);
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: Tri8<'_>);
     fn analytic(self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self;
 }
 
@@ -263,7 +266,7 @@ impl<const K: usize> Found<K> for Bests {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4) {
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: Tri8<'_>) {
         for n in 0..leaf.count() {
             if let Some((hit, [t, u, v])) = p.hits(leaf, n, active, self.t) {
                 let prim = u32x8::splat(leaf.number(n));
@@ -303,7 +306,7 @@ impl<const K: usize> Found<K> for Stopped {
     }
 
     #[inline(always)]
-    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: &Tri4) {
+    fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: Tri8<'_>) {
         for n in 0..leaf.count() {
             if let Some((hit, _)) = p.hits(leaf, n, active, self.t_max) {
                 self.blocked |= hit;

@@ -1,8 +1,8 @@
 //! The walk through the tree: once for the closest hit, once for any.
 
-use super::node::{ANALYTIC, EMPTY, LEAF};
+use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::probe::Probe;
-use super::triangle::Best;
+use super::triangle::{Best, Tri8};
 use super::{Bvh, DEEP, RawHit, Ray};
 use std::cell::Cell;
 
@@ -31,13 +31,22 @@ impl Bvh {
         if !self.large {
             return;
         }
-        if child & LEAF == 0 {
-            if let Some(node) = self.nodes.get(child as usize) {
-                node.fetch();
-            }
-        } else if let Some(t) = self.triangles.get((child & !LEAF) as usize) {
-            t.fetch();
+        // Of an analytic shape the place of something else: no harm, and no branch.
+        if let Some(slot) = self.slots.get((child & !LEAF) as usize) {
+            slot.fetch();
         }
+    }
+
+    /// An inner node.
+    #[inline(always)]
+    pub(super) fn node(&self, at: u32) -> Node<'_> {
+        Node(&self.slots[at as usize])
+    }
+
+    /// A leaf of triangles.
+    #[inline(always)]
+    pub(super) fn leaf(&self, at: u32) -> Tri8<'_> {
+        Tri8(&self.slots[(at & !LEAF) as usize])
     }
 
     /// See [`super::Accel::closest`].
@@ -57,21 +66,21 @@ impl Bvh {
         loop {
             let p = in_memory(p);
             if at & LEAF == 0 {
-                let node = &self.nodes[at as usize];
+                let node = self.node(at);
                 let (mut mask, enter) = node.meet(p, best.t);
                 if mask != 0 {
                     let enter = enter.as_array();
                     let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     if mask == 0 {
-                        at = node.child[i];
+                        at = node.child(i);
                         continue;
                     }
                     let j = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
-                    let (a, b) = (entry(enter[i], node.child[i]), entry(enter[j], node.child[j]));
-                    self.fetch(node.child[i]);
-                    self.fetch(node.child[j]);
+                    let (a, b) = (entry(enter[i], node.child(i)), entry(enter[j], node.child(j)));
+                    self.fetch(node.child(i));
+                    self.fetch(node.child(j));
                     let mut nearest = a.min(b);
                     stack[top & (DEEP - 1)].set(a.max(b));
                     let base = top;
@@ -79,8 +88,8 @@ impl Bvh {
                     while mask != 0 {
                         let i = mask.trailing_zeros() as usize & 7;
                         mask &= mask - 1;
-                        let next = entry(enter[i], node.child[i]);
-                        self.fetch(node.child[i]);
+                        let next = entry(enter[i], node.child(i));
+                        self.fetch(node.child(i));
                         let farther = next.max(nearest);
                         nearest = next.min(nearest);
                         let mut k = top;
@@ -95,7 +104,7 @@ impl Bvh {
                     continue;
                 }
             } else if at & ANALYTIC == 0 {
-                self.triangles[(at & !LEAF) as usize].closest(p, &mut best);
+                self.leaf(at).closest(p, &mut best);
             } else {
                 self.analytic[(at & !(LEAF | ANALYTIC)) as usize].closest(p.o, p.d, &mut best);
             }
@@ -138,11 +147,11 @@ impl Bvh {
         loop {
             let p = in_memory(p);
             if at & LEAF == 0 {
-                let node = &self.nodes[at as usize];
+                let node = self.node(at);
                 let (mut mask, _) = node.meet(p, t_max);
                 if mask != 0 {
                     loop {
-                        at = node.child[mask.trailing_zeros() as usize & 7];
+                        at = node.child(mask.trailing_zeros() as usize & 7);
                         mask &= mask - 1;
                         self.fetch(at);
                         if mask == 0 {
@@ -154,7 +163,7 @@ impl Bvh {
                     continue;
                 }
             } else if at & ANALYTIC == 0 {
-                if self.triangles[(at & !LEAF) as usize].occluded(p, t_max) {
+                if self.leaf(at).occluded(p, t_max) {
                     return true;
                 }
             } else if self.analytic[(at & !(LEAF | ANALYTIC)) as usize].occluded(p.o, p.d, t_max) {

@@ -4,16 +4,19 @@
 //! HPG 2017. Which binary nodes become wide ones, and which subtrees one leaf, is the choice of least expected cost.
 
 use super::Bounds;
+use super::batch::SMALL;
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
-use super::triangle::Tri4;
+use super::slot::Slot;
+use super::triangle::Tri8;
 use glam::Vec3;
-use wide::f32x8;
 
 /// What opening a wide node costs against testing one leaf.
 const NODE_COST: f32 = 1.0;
 const LEAF_COST: f32 = 0.8;
 /// Triangles a leaf holds.
-const WIDTH: u32 = 4;
+const WIDTH: u32 = 8;
+/// The same in a tree that packets of rays walk, which test triangles one by one.
+const NARROW: u32 = 4;
 
 /// A binary tree with one primitive a leaf. The root is node 0.
 pub(super) struct Binary {
@@ -40,8 +43,7 @@ pub(super) enum Item {
 
 /// What the walk needs.
 pub(super) struct Wide {
-    pub(super) nodes: Vec<Node>,
-    pub(super) triangles: Vec<Tri4>,
+    pub(super) slots: Vec<Slot>,
     pub(super) root: u32,
     pub(super) stack: usize,
 }
@@ -94,6 +96,7 @@ impl Binary {
     }
 
     fn costs(&self, items: &[Item]) -> Vec<Costs> {
+        let width = if items.len() > SMALL { WIDTH } else { NARROW };
         let none = Costs { slots: [0.0; 7], triangles: 1, leaf: true };
         let mut costs = vec![none; self.nodes.len()];
         for &n in self.order().iter().rev() {
@@ -107,7 +110,7 @@ impl Binary {
             let inside = Self::share(&costs, both, 8).0;
             let as_node = area * NODE_COST + inside;
             let as_leaf = area * LEAF_COST;
-            let leaf = triangles <= WIDTH && as_leaf <= as_node;
+            let leaf = triangles <= width && as_leaf <= as_node;
             let mut slots = [if leaf { as_leaf } else { as_node }; 7];
             for i in 1..7 {
                 slots[i] = slots[i - 1].min(Self::share(&costs, both, i + 1).0);
@@ -161,27 +164,28 @@ impl Binary {
     /// Collapses the tree. The children of a node lie side by side, subtrees follow depth first.
     pub(super) fn widen(&self, items: &[Item]) -> Wide {
         let costs = self.costs(items);
+        let mut slots = Vec::new();
+        // Where the nodes are, parents before children.
         let mut nodes = Vec::new();
-        let mut triangles = Vec::new();
         let mut kids = Vec::with_capacity(8);
         let mut leaf = Vec::with_capacity(WIDTH as usize);
         // A subtree that becomes a node, and its place.
         let mut todo = Vec::new();
-        let mut place = |n: u32, nodes: &mut Vec<Node>, todo: &mut Vec<(u32, usize)>| {
+        let mut place = |n: u32, slots: &mut Vec<Slot>, todo: &mut Vec<(u32, usize)>| {
             if let Some(place) = self.analytic(items, n) {
                 LEAF | ANALYTIC | place
             } else if costs[n as usize].leaf {
                 leaf.clear();
                 self.gather(items, n, &mut leaf);
-                triangles.push(Tri4::new(&leaf));
-                LEAF | (triangles.len() - 1) as u32
+                slots.push(Tri8::slot(&leaf));
+                LEAF | (slots.len() - 1) as u32
             } else {
-                nodes.push(Node::NONE);
-                todo.push((n, nodes.len() - 1));
-                (nodes.len() - 1) as u32
+                slots.push(Tri8::slot(&[]));
+                todo.push((n, slots.len() - 1));
+                (slots.len() - 1) as u32
             }
         };
-        let root = place(0, &mut nodes, &mut todo);
+        let root = place(0, &mut slots, &mut todo);
         while let Some((n, me)) = todo.pop() {
             kids.clear();
             if let Some(both) = self.children(n) {
@@ -201,26 +205,26 @@ impl Binary {
                 for (axis, planes) in planes.iter_mut().enumerate() {
                     planes[lane] = [b.min[axis], b.max[axis]];
                 }
-                child[lane] = place(kid, &mut nodes, &mut todo);
+                child[lane] = place(kid, &mut slots, &mut todo);
             }
-            let pair = |axis: usize| [0, 1].map(|side| f32x8::new(planes[axis].map(|p| p[side])));
-            nodes[me] = Node { x: pair(0), y: pair(1), z: pair(2), child };
+            nodes.push(me);
+            slots[me] = Node::slot(planes, child);
         }
-        nodes.shrink_to_fit();
-        triangles.shrink_to_fit();
-        let stack = stack_needed(&nodes);
-        Wide { nodes, triangles, root, stack }
+        slots.shrink_to_fit();
+        let stack = stack_needed(&slots, &nodes);
+        Wide { slots, root, stack }
     }
 }
 
-/// Most entries a walk can hold at once, whatever order it takes the children in.
-fn stack_needed(nodes: &[Node]) -> usize {
-    let mut needed = vec![0usize; nodes.len()];
-    for (n, node) in nodes.iter().enumerate().rev() {
-        let present = node.child.iter().filter(|&&c| c != EMPTY);
+/// Most entries a walk can hold at once, whatever order it takes the children in. `nodes` are the places of the nodes, parents first.
+fn stack_needed(slots: &[Slot], nodes: &[usize]) -> usize {
+    let mut needed = vec![0usize; slots.len()];
+    for &n in nodes.iter().rev() {
+        let children = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| Node(&slots[n]).child(i));
+        let present = children.iter().filter(|&&c| c != EMPTY);
         let count = present.clone().count();
         let deepest = present.filter(|&&c| c & LEAF == 0).map(|&c| needed[c as usize]).max().unwrap_or(0);
         needed[n] = count.saturating_sub(1) + deepest;
     }
-    needed.first().copied().unwrap_or(0)
+    nodes.first().map_or(0, |&n| needed[n])
 }

@@ -188,6 +188,16 @@ impl Bsdf {
         }
     }
 
+    /// The reflectance, where the side that faces a direction of this local z is [`diffuse`] and nothing else, and the side: a direction's
+    /// local z times it is positive where the surface reflects.
+    #[inline(always)]
+    pub fn as_diffuse(&self, z: f32) -> Option<(&Texture, f32)> {
+        match self.facing(Vec3::new(0.0, 0.0, z)) {
+            (Bsdf::Diffuse(b), side) => Some((&b.reflectance, side)),
+            _ => None,
+        }
+    }
+
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] at once, for a walk in `mode`: what next event estimation asks.
     #[inline(always)]
     pub fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {

@@ -1,6 +1,6 @@
 //! A shape that shines.
 
-use super::{EmissionPdf, Emitted};
+use super::{EmissionPdf, Emitted, LightPoint};
 use crate::math::distribution::Discrete;
 use crate::math::elementary::sin_cos_turns;
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, warp};
@@ -92,6 +92,19 @@ impl Area {
     fn sample_position(&self, surfaces: &Surfaces, u_primitive: f32, u: Vec2) -> SurfacePoint {
         let index = self.choice.as_ref().map_or(0, |choice| choice.sample(u_primitive).index);
         surfaces.sample(self.first + index, u)
+    }
+
+    /// Is direct sampling a point uniform by area, wherever it is seen from?
+    pub(super) fn by_area(&self) -> bool {
+        self.sphere.is_none()
+    }
+
+    /// The point that [`Area::sample_direct`] looks at, where that is uniform by area.
+    #[inline(always)]
+    pub(super) fn sample_point(&self, surfaces: &Surfaces, pick: f32, u_primitive: f32, u: Vec2) -> LightPoint {
+        let point = self.sample_position(surfaces, u_primitive, u);
+        let end = Endpoint { n_g: emitting_normal(point.end.n_g, point.n_s), ..point.end };
+        LightPoint { end, n_s: point.n_s, radiance: self.radiance.eval(point.uv), pdf: self.pdf, pick }
     }
 
     /// A sphere seen from outside fills a cone, which is sampled instead of its area.

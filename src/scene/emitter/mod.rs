@@ -44,6 +44,21 @@ pub struct DirectSample {
     pub pdf: SolidAnglePdf,
 }
 
+/// A point on a light, uniform by area, seen from nowhere yet.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPoint {
+    /// Where it is; the geometric normal is turned to the emitting side.
+    pub end: Endpoint,
+    /// Shading normal.
+    pub n_s: Vec3,
+    /// Radiance into every direction above both normals.
+    pub radiance: Rgb,
+    /// Density of the point on its light.
+    pub pdf: AreaPdf,
+    /// Probability with which the light was chosen.
+    pub pick: f32,
+}
+
 /// A ray of light leaving an emitter.
 #[derive(Clone, Copy, Debug)]
 pub struct EmissionSample {

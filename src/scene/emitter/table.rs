@@ -1,6 +1,6 @@
 //! All emitters of a scene with a choice by power: every question about light goes through here.
 
-use super::{DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterError, EmitterKind, area};
+use super::{DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterError, EmitterKind, LightPoint, area};
 use crate::math::distribution::{Choice, Discrete};
 use crate::math::{AreaPdf, Frame, Rgb, SolidAnglePdf, warp};
 use crate::scene::EmitterId;
@@ -79,6 +79,8 @@ pub(in crate::scene) struct Emitters {
     /// The emitter that surrounds the scene.
     environment: Option<EmitterId>,
     ball: Ball,
+    /// Direct sampling always means a point uniform by area.
+    by_area: bool,
 }
 
 impl Emitters {
@@ -94,7 +96,8 @@ impl Emitters {
         }
         let choice = Discrete::new(powers.iter().map(|p| f64::from(p.mean())));
         let environment = list.iter().position(|e| e.kind() == EmitterKind::Infinite).map(|i| EmitterId(i as u32));
-        Ok(Self { list, powers, choice, environment, ball })
+        let by_area = list.iter().all(|e| matches!(e, Emitter::Area(a) if a.by_area()));
+        Ok(Self { list, powers, choice, environment, ball, by_area })
     }
 
     pub(in crate::scene) fn list(&self) -> &[Emitter] {
@@ -153,6 +156,20 @@ impl Emitters {
             radiance: s.radiance,
             pdf: s.pdf * choice.probability,
         })
+    }
+
+    /// The choice of an emitter and a point on it, of which [`Emitters::sample_direct`] makes a light sample. `None` if some emitter of the
+    /// scene is not sampled by area, and in a scene without light.
+    #[inline(always)]
+    pub(in crate::scene) fn sample_point(&self, surfaces: &Surfaces, u_pick: f32, u: Vec2) -> Option<LightPoint> {
+        match self.pick(u_pick)? {
+            (_, Emitter::Area(area), choice) if self.by_area => Some(area.sample_point(surfaces, choice.probability, choice.rest, u)),
+            _ => None,
+        }
+    }
+
+    pub(in crate::scene) fn by_area(&self) -> bool {
+        self.by_area && self.choice.is_some()
     }
 
     /// A light sample on an emitter that has no surface, chosen with probability `pick`.
