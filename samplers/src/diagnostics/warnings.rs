@@ -121,6 +121,7 @@ mod tests {
             next_share: 0.25,
             steps: 1000,
             uncounted: 0,
+            redraw_acceptance: None,
             acceptance: Some(0.234),
             step_size: Some(0.1),
             dispersion: 2.0,
