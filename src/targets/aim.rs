@@ -111,7 +111,7 @@ impl Aimer {
         }
         let new = self.iterations.is_power_of_two() && self.read_densities(&aims);
         self.iterations += 1;
-        // Nothing known: the full target starts as the kernel's (theory B.7).
+        // Nothing known: the full target starts as the kernel's.
         for aim in &mut aims {
             aim.full = self.inverse_densities.get(aim.leaf as usize).map_or(aim.kernel, |inverse| (f64::from(aim.kernel) * inverse) as f32);
         }

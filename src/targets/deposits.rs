@@ -60,7 +60,7 @@ impl Deposits {
         }
     }
 
-    /// A path counts once a point, however many of its vertices lie there: `P_k` is a probability (theory B.5).
+    /// A path counts once a point, however many of its vertices lie there: `P_k` is a probability.
     fn learn(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
         let psi = &mut self.psi[drawn.stratum];
         for (i, touch) in path.touches.iter().enumerate() {

@@ -3,6 +3,7 @@
 //! `cargo test --release --test verification -- --ignored --nocapture --test-threads 1`
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod samplers;
 mod slopes;
 #[path = "../support/mod.rs"]
 mod support;

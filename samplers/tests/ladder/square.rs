@@ -56,7 +56,7 @@ fn wrong_assumed_normalisations_cost_variance_alone() {
         let values = estimates(&settings(1000, 4), Some(&wrong));
         assert_mean(&values, truth, 3, 0.06, &format!("factors {k}"));
     }
-    // The same weights with the assumed normalisations outside as well (theory B.4 c) are wrong, and these tests would see it.
+    // The same weights with the assumed normalisations outside as well are wrong, and these tests would see it.
     let strata = |seed| {
         let mut ladder = Ladder::new(settings(seed, 4));
         let doubled = [1.0, 2.0 * b[1], 2.0 * b[2], 2.0 * b[3]];

@@ -15,7 +15,7 @@ fn exact(regions: &mut Regions, sizes: &[f64], density: impl Fn(usize) -> f64, p
 const CUT: Refinement = Refinement::Cut { paths: 100.0, error: 0.05 };
 const BLEND: Refinement = Refinement::Blend { strength: 64.0 };
 
-/// Theory G17: kernel sizes that come and go leave a constant density constant.
+/// Kernel sizes that come and go leave a constant density constant.
 #[test]
 fn a_constant_density_stays_whatever_the_kernel_sizes() {
     for refinement in [CUT, BLEND] {

@@ -1,0 +1,92 @@
+//! Every photon sampler has the same expected image at a constant radius.
+
+use super::support::{common, load_file, render, root, shared};
+use isophote::image::tiles::{run_means, tiles};
+use isophote::integrators::Common;
+use isophote::math::Rgb;
+use isophote::math::statistics::{Sample, sidak, welch};
+use rayon::prelude::*;
+use std::path::PathBuf;
+
+const SEEDS: u64 = 16;
+/// Of 100,000 light paths each.
+const ITERATIONS: u64 = 12;
+const SAMPLERS: [&str; 4] = ["visibility", "kernel", "image", "spatial"];
+/// Scenes a family holds.
+const SCENES: usize = 5;
+
+/// Independent runs; samplers take seeds of their own, so that camera subpaths are not shared.
+fn images(scene: &isophote::scene::mitsuba::LoadedScene, sampler: &str, number: u64) -> Vec<Vec<Rgb>> {
+    let settings = format!("{{\"sampler\": \"{sampler}\", \"alpha\": 1.0, \"photons\": 100000}}");
+    let base = common(0, scene.defaults.max_depth);
+    let run = |seed| render(scene, "sppm", &settings, &Common { seed: 100 * number + seed, ..base.clone() }, ITERATIONS).0;
+    (1..=SEEDS).into_par_iter().map(run).collect()
+}
+
+/// Run-level Welch tests of every sampler against the uniform one, the image and tiles of 256 pixels, three channels.
+fn samplers_agree(file: PathBuf, size: (u32, u32)) {
+    let scene = load_file(&file, Some(size));
+    let (width, height) = (size.0 as usize, size.1 as usize);
+    let kept = vec![true; width * height];
+    let mut places = vec![("image".to_owned(), (0..kept.len()).collect::<Vec<usize>>())];
+    places.extend(tiles(width, height, 16, &kept).into_iter().map(|((x, y), p)| (format!("tile ({x}, {y})"), p)));
+    let threshold = sidak(0.01, places.len() * 3 * SAMPLERS.len() * SCENES);
+    let uniform = images(&scene, "uniform", 0);
+    let mut failures = Vec::new();
+    for (number, sampler) in (1..).zip(SAMPLERS) {
+        let runs = images(&scene, sampler, number);
+        for (place, pixels) in &places {
+            for channel in 0..3 {
+                let [a, b] = [&uniform, &runs].map(|runs| Sample::of(&run_means(runs, pixels, channel)));
+                let p = welch(&a, &b);
+                let line = format!(
+                    "{sampler}, {place}, channel {channel}: {:.5} +- {:.5}, uniform {:.5} +- {:.5}, p {p:.1e}",
+                    b.mean,
+                    b.variance.sqrt(),
+                    a.mean,
+                    a.variance.sqrt()
+                );
+                if place == "image" {
+                    eprintln!("{} {line}", file.display());
+                }
+                if p < threshold {
+                    failures.push(line);
+                }
+            }
+        }
+    }
+    eprintln!("{}: {} of {} tests below {threshold:.1e}", file.display(), failures.len(), places.len() * 3 * SAMPLERS.len());
+    assert!(failures.is_empty(), "{}:\n{}", file.display(), failures.join("\n"));
+}
+
+macro_rules! own {
+    ($($test:ident: $scene:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes; run by .ci/run"]
+        fn $test() {
+            samplers_agree(root().join("scenes").join($scene).join("scene.xml"), (96, 72));
+        }
+    )*};
+}
+
+own! {
+    samplers_on_hall: "hall";
+    samplers_on_pool: "pool";
+    samplers_on_balls: "balls";
+}
+
+macro_rules! foreign {
+    ($($test:ident: $scene:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes; run by .ci/run"]
+        fn $test() {
+            let Some(shared) = shared() else { return };
+            samplers_agree(shared.join("scenes").join($scene).join("scene.xml"), (96, 96));
+        }
+    )*};
+}
+
+foreign! {
+    samplers_on_cbox_spheres: "cbox-spheres";
+    samplers_on_veach_bidir: "veach-bidir";
+}
