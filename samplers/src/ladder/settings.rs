@@ -77,7 +77,7 @@ impl Default for LadderSettings {
             first_burn_in: 1000,
             later_burn_in: 0,
             acceptance: 0.234,
-            redraw: 0.5,
+            redraw: 0.15,
             combine: Combine::Mis,
             allocation: Allocation::Fixed,
             normaliser: Normaliser::Pass,

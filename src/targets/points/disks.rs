@@ -106,12 +106,16 @@ impl DiskGrid {
         for i in 0..count {
             let Lookup { place, p, bucket: coarse } = scratch[i];
             let mut levels = self.present[coarse as usize];
+            let first = scratch.len();
             while levels != 0 {
                 let level = levels.trailing_zeros();
                 levels &= levels - 1;
                 let bucket = bucket(cell_of(p, self.inverse_cells[level as usize]), level, self.starts.len() as u32 - 2);
-                fetch(&self.starts[bucket as usize]);
-                scratch.push(Lookup { place, p, bucket });
+                // Cells of two levels can share a bucket, which is read once.
+                if scratch[first..].iter().all(|lookup| lookup.bucket != bucket) {
+                    fetch(&self.starts[bucket as usize]);
+                    scratch.push(Lookup { place, p, bucket });
+                }
             }
         }
         for lookup in &scratch[count..] {

@@ -76,13 +76,15 @@ fn the_cut_waits_for_paths_and_for_halves_that_agree() {
 #[test]
 fn blending_shrinks_towards_the_parent() {
     let mut regions = Regions::spatial(line(1000));
-    let sizes = vec![1.0; regions.leaves()];
+    let leaves = regions.leaves();
+    let sizes = vec![1.0; leaves];
     let mut last = f64::INFINITY;
     for _ in 0..5 {
         exact(&mut regions, &sizes, |leaf| if leaf == 0 { 0.0 } else { 1.0 }, 100.0);
         let (densities, _) = regions.densities(BLEND);
         assert!(densities[0] > 0.0 && densities[0] < last, "{} after {last}", densities[0]);
-        assert!((densities[9] - 1.0).abs() < 1e-9);
+        // Far away only what the root says of it is felt.
+        assert!((densities[leaves - 1] - 1.0).abs() < 0.01);
         last = densities[0];
     }
     assert!(last < 0.3);
