@@ -34,13 +34,31 @@ const LEVELS: u32 = 24;
 /// cell that it meets, so that a query reads one list a level; a grid of the widest cells tells beforehand which levels have anything near.
 #[derive(Debug)]
 pub(super) struct DiskGrid {
-    /// Widest cell first: reciprocal of the side at each level.
-    inverse_cells: Vec<f32>,
+    /// Widest cells first.
+    levels: Vec<Level>,
     /// Bucket `b` holds `groups[starts[b]..starts[b + 1]]`.
     starts: Vec<u32>,
     groups: Vec<Group>,
     /// Levels present in each bucket of the widest cells.
     present: Vec<u32>,
+}
+
+/// Cells of one size. Levels have buckets of their own: a ball lies in several buckets of its level, and in one list that a query reads.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    /// Reciprocal of the side of a cell.
+    inverse_cell: f32,
+    /// Number of its first bucket.
+    first: u32,
+    /// One less than the number of its buckets, a power of two.
+    mask: u32,
+}
+
+impl Level {
+    #[inline(always)]
+    fn bucket(&self, cell: IVec3) -> u32 {
+        self.first + (hash(cell) & self.mask)
+    }
 }
 
 impl DiskGrid {
@@ -49,19 +67,28 @@ impl DiskGrid {
         let count = balls.len();
         let widest = balls.clone().map(|(_, r)| r).fold(0.0, f32::max);
         let narrowest = balls.clone().map(|(_, r)| r).fold(f32::INFINITY, f32::min);
-        let levels = if count == 0 { 0 } else { ((widest / narrowest).log2().floor() as u32 + 1).clamp(1, LEVELS) };
-        let inverse_cells: Vec<f32> = (0..levels).map(|level| 0.5 * (level as f32).exp2() / widest).collect();
-        let buckets = (4 * count.max(1)).next_power_of_two();
-        let mask = (buckets - 1) as u32;
-        let coarse_mask = (count.max(1).next_power_of_two() - 1) as u32;
+        let level_count = if count == 0 { 0 } else { ((widest / narrowest).log2().floor() as u32 + 1).clamp(1, LEVELS) };
+        let level_of = |r: f32| ((widest / r).log2().floor() as u32).min(level_count - 1) as usize;
+
+        // Four buckets a ball, in each level.
+        let mut of_level = vec![0usize; level_count as usize];
+        balls.clone().for_each(|(_, r)| of_level[level_of(r)] += 1);
+        let mut buckets = 0;
+        let level = |(level, balls): (usize, &usize)| {
+            let size = (4 * balls).next_power_of_two();
+            let first = buckets;
+            buckets += size;
+            Level { inverse_cell: 0.5 * (level as f32).exp2() / widest, first: first as u32, mask: (size - 1) as u32 }
+        };
+        let levels: Vec<Level> = of_level.iter().enumerate().map(level).collect();
 
         let mut starts = vec![0u32; buckets + 1];
-        let mut present = vec![0u32; coarse_mask as usize + 1];
-        let level_of = |r: f32| ((widest / r).log2().floor() as u32).min(levels - 1);
+        let mut present = vec![0u32; count.max(1).next_power_of_two()];
+        let all = Level { inverse_cell: levels.first().map_or(1.0, |level| level.inverse_cell), first: 0, mask: present.len() as u32 - 1 };
         for (p, r) in balls.clone() {
             let level = level_of(r);
-            cells(p, r, inverse_cells[level as usize], level, mask, |bucket| starts[bucket as usize + 1] += 1);
-            cells(p, r, inverse_cells[0], LEVELS, coarse_mask, |bucket| present[bucket as usize] |= 1 << level);
+            cells(p, r, &levels[level], |bucket| starts[bucket as usize + 1] += 1);
+            cells(p, r, &all, |bucket| present[bucket as usize] |= 1 << level);
         }
         // From balls a bucket to the first group of each.
         let mut sum = 0;
@@ -72,8 +99,7 @@ impl DiskGrid {
         let mut taken = vec![0u32; buckets];
         let mut groups = vec![Group::default(); sum as usize];
         for (index, (p, r)) in balls.enumerate() {
-            let level = level_of(r);
-            cells(p, r, inverse_cells[level as usize], level, mask, |bucket| {
+            cells(p, r, &levels[level_of(r)], |bucket| {
                 let place = taken[bucket as usize] as usize;
                 taken[bucket as usize] += 1;
                 let (group, lane) = (&mut groups[starts[bucket as usize] as usize + place / LANES], place % LANES);
@@ -81,7 +107,7 @@ impl DiskGrid {
                 (group.radius2[lane], group.index[lane]) = (r * r, index as u32);
             });
         }
-        Self { inverse_cells, starts, groups, present }
+        Self { levels, starts, groups, present }
     }
 
     /// Calls `visit` with the number of a place and of a ball that holds it, for all of them, places in order. `scratch` is memory.
@@ -94,11 +120,11 @@ impl DiskGrid {
         scratch: &mut Vec<Lookup>,
         mut visit: impl FnMut(u32, u32),
     ) {
-        let Some(&widest) = self.inverse_cells.first() else { return };
-        let coarse_mask = self.present.len() as u32 - 1;
+        let Some(widest) = self.levels.first() else { return };
+        let all = Level { first: 0, mask: self.present.len() as u32 - 1, ..*widest };
         scratch.clear();
         for (place, p) in (0u32..).zip(places.clone()) {
-            let bucket = bucket(cell_of(p, widest), LEVELS, coarse_mask);
+            let bucket = all.bucket(cell_of(p, all.inverse_cell));
             fetch(&self.present[bucket as usize]);
             scratch.push(Lookup { place, p, bucket });
         }
@@ -106,16 +132,12 @@ impl DiskGrid {
         for i in 0..count {
             let Lookup { place, p, bucket: coarse } = scratch[i];
             let mut levels = self.present[coarse as usize];
-            let first = scratch.len();
             while levels != 0 {
-                let level = levels.trailing_zeros();
+                let level = &self.levels[levels.trailing_zeros() as usize];
                 levels &= levels - 1;
-                let bucket = bucket(cell_of(p, self.inverse_cells[level as usize]), level, self.starts.len() as u32 - 2);
-                // Cells of two levels can share a bucket, which is read once.
-                if scratch[first..].iter().all(|lookup| lookup.bucket != bucket) {
-                    fetch(&self.starts[bucket as usize]);
-                    scratch.push(Lookup { place, p, bucket });
-                }
+                let bucket = level.bucket(cell_of(p, level.inverse_cell));
+                fetch(&self.starts[bucket as usize]);
+                scratch.push(Lookup { place, p, bucket });
             }
         }
         for lookup in &scratch[count..] {
@@ -148,17 +170,17 @@ pub(super) struct Lookup {
 }
 
 /// Calls `visit` with the bucket of every cell that the ball meets, each bucket once: a ball must not stand twice in a list.
-fn cells(p: Vec3, radius: f32, inverse_cell: f32, level: u32, mask: u32, mut visit: impl FnMut(u32)) {
+fn cells(p: Vec3, radius: f32, level: &Level, mut visit: impl FnMut(u32)) {
     // Wider by the rounding of these sums, so that no point inside the ball falls outside its cells.
     let reach = Vec3::splat(radius + (p.abs().max_element() + radius) * f32::EPSILON);
-    let (low, high) = (cell_of(p - reach, inverse_cell), cell_of(p + reach, inverse_cell));
+    let (low, high) = (cell_of(p - reach, level.inverse_cell), cell_of(p + reach, level.inverse_cell));
     let mut seen = [u32::MAX; 27];
     let mut count = 0;
     // A diameter is no wider than a cell, so at most two cells an axis, three where rounding widens it.
     for z in low.z..=high.z {
         for y in low.y..=high.y {
             for x in low.x..=high.x {
-                let bucket = bucket(IVec3::new(x, y, z), level, mask);
+                let bucket = level.bucket(IVec3::new(x, y, z));
                 if !seen[..count].contains(&bucket) && count < seen.len() {
                     seen[count] = bucket;
                     count += 1;
@@ -174,12 +196,12 @@ fn cell_of(p: Vec3, inverse_cell: f32) -> IVec3 {
     (p * inverse_cell).floor().as_ivec3()
 }
 
-/// Teschner et al.'s primes, the level among them, and a last mix so that the low bits depend on all.
+/// Teschner et al.'s primes, and a last mix so that the low bits depend on all.
 #[inline(always)]
-fn bucket(cell: IVec3, level: u32, mask: u32) -> u32 {
+fn hash(cell: IVec3) -> u32 {
     let h = (cell.x as u32).wrapping_mul(73_856_093) ^ (cell.y as u32).wrapping_mul(19_349_663) ^ (cell.z as u32).wrapping_mul(83_492_791);
-    let h = (h ^ level.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
-    (h ^ (h >> 15)) & mask
+    let h = h.wrapping_mul(0x85eb_ca6b);
+    h ^ (h >> 15)
 }
 
 #[cfg(test)]
