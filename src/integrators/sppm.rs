@@ -4,8 +4,8 @@
 //! rougher than the threshold is the gather; a path without one is seen directly or through a smooth chain, and its emission is added here.
 //! The estimate is biased by the finite radius and consistent for alpha < 1.
 //!
-//! With the uniform sampler photons come first and measurement points gather and are gone ([`uniform`]): an iteration depends on its index alone.
-//! A sampler with a target needs the points first ([`aimed`]).
+//! With the uniform sampler photons come first and measurement points gather and are gone (`uniform`): an iteration depends on its index alone.
+//! A sampler with a target needs the points first (`aimed`).
 
 mod aimed;
 mod eye;

@@ -92,7 +92,7 @@ impl Aimer {
     /// Targets at every point, and whether the full target is a new one. `shrink` is the radius schedule's factor on the first iteration's
     /// radii.
     ///
-    /// Densities are read before iterations 1, 2, 4, 8, ... and stay in between. [STF] reads them before every iteration, which has a bias: where
+    /// Densities are read before iterations 1, 2, 4, 8, ... and stay in between. \[STF\] reads them before every iteration, which has a bias: where
     /// chains have lingered the density is found too high and the target made low, while the chains still stand there and bring
     /// more than the new target grants. Chains that are burnt in again at a new target forget that; at doubling intervals it costs little.
     pub fn aim(&mut self, points: &Points<'_>, place: Place, shrink: f64) -> (Vec<Aim>, bool) {

@@ -58,7 +58,7 @@ impl Statistics {
 }
 
 impl Regions {
-    /// Regions of space: a kd-tree by median splits of the longest side over a pilot's measurement points, at most [`tree::DEPTH`] deep.
+    /// Regions of space: a kd-tree by median splits of the longest side over a pilot's measurement points, at most fifteen deep.
     pub fn spatial(pilot: Vec<Vec3>) -> Self {
         Self::over(Tree::median(pilot))
     }

@@ -9,7 +9,7 @@
 //! **Redrawn ends.** Some steps keep the coordinates before a cut and draw the rest afresh: where it is hard to come in and easy to move
 //! about inside, they leave a place at once that small steps linger in. The cut is uniform over the `L(x)` coordinates the path used, and a
 //! path that keeps the first k of them uses more than k, so the way back exists with probability `1/L(y)`; the acceptance is
-//! `min(1, T_c(y) L(x) / (T_c(x) L(y)))`. This is not in [STF] or [HACHISUKA11].
+//! `min(1, T_c(y) L(x) / (T_c(x) L(y)))`. This is not in \[STF\] or \[HACHISUKA11\].
 
 use super::carry::Carried;
 use super::schedule::Schedule;
