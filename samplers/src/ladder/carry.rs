@@ -5,7 +5,8 @@
 //! survive the move stand where points are dense, and those that do not are replaced by what is near. So a draw keeps a sample of the states
 //! it counted, with their targets. The next one evaluates its own targets at all of them and resamples every chain's start with probability
 //! proportional to `T'_c/T_c`: sampling importance resampling, the step of sequential Monte Carlo from one target to the next. What remains
-//! is an error of the order of one over the number of states kept.
+//! is an error of the order of one over the number of states kept, and what the old target does not cover: states that only the new one sees are
+//! not among those kept, so that a place that loses and gains states at every draw begins each with too few (docs/methods/samplers.md, known bias).
 
 use super::start::evenly;
 use crate::mutation::Coordinates;
