@@ -68,7 +68,7 @@ impl Ladder {
             dispersions: vec![Dispersion::default(); rungs],
             shares: schedule::fixed_shares(rungs),
             exchanges: true,
-            retargeted: true,
+            retargeted: false,
             summary: Summary::new(rungs),
             settings,
         }
@@ -80,9 +80,9 @@ impl Ladder {
         Self { exchanges: false, ..self }
     }
 
-    /// Says that the next draw's targets differ from the last draw's by more than what follows from new measurements: its chains burn in as at
-    /// first. Where a target was made from what these very chains found, they stand where it has just become small, and without burn-in
-    /// they give too much there.
+    /// Says that the next draw's targets are not the last draw's: its chains start from states of the last draw, resampled by what the new
+    /// targets make of them, and burn in again; pooled normalisations begin anew. Without this call the targets must be the same functions,
+    /// and chains go on from where they stand: they keep their laws, with no start-up to forget.
     pub fn retargeted(&mut self) {
         self.retargeted = true;
     }
@@ -141,6 +141,17 @@ impl Ladder {
         }
     }
 
+    /// Starts of all chains under new targets, from the last draw's states.
+    fn restart<P: LightPathSpace>(&mut self, space: &P, iteration: u64) {
+        self.normalisation.forget();
+        for rung in 1..self.strata() {
+            let chains = self.chains.iter_mut().map(|chains| &mut chains[rung - 1]);
+            let (traced, dead) = self.carried[rung].start(space, (self.settings.seed, iteration), rung, self.settings.rungs, chains);
+            self.traced += traced;
+            self.summary.add_dead(rung, dead);
+        }
+    }
+
     fn plan<'a>(&self, iteration: u64, count: u64, shares: &'a [f64]) -> Plan<'a> {
         let settings = &self.settings;
         // Every ensemble takes the same strides, from the steps of the largest.
@@ -151,7 +162,11 @@ impl Ladder {
             iteration,
             shares,
             mixture: Mixture::new(settings.combine, shares, &self.normalisation.assumed, &self.taus(1.0)),
-            burn_in: if self.retargeted { settings.first_burn_in } else { settings.later_burn_in },
+            burn_in: match (self.draws, self.retargeted) {
+                (0, _) => settings.first_burn_in,
+                (_, true) => settings.later_burn_in,
+                (_, false) => 0,
+            },
             acceptance: settings.acceptance,
             redraw: settings.redraw,
             exchanges: self.exchanges,
@@ -198,11 +213,8 @@ impl PhotonSampler for Ladder {
                 self.normalisation.assumed = vec![1.0];
             }
         }
-        for rung in 1..rungs {
-            let chains = self.chains.iter_mut().map(|chains| &mut chains[rung - 1]);
-            let (traced, dead) = self.carried[rung].start(space, (self.settings.seed, iteration), rung, rungs, chains);
-            self.traced += traced;
-            self.summary.add_dead(rung, dead);
+        if self.retargeted && self.draws > 0 {
+            self.restart(space, iteration);
         }
         let shares = self.shares.clone();
         let plan = self.plan(iteration, count, &shares);
@@ -227,8 +239,7 @@ impl PhotonSampler for Ladder {
         }
         drawn.carry(&mut self.carried);
         self.summary.add(&drawn, &shares, &plan.trace_strides);
-        let pooled_below = if self.settings.normaliser == Normaliser::Pooled { self.settings.poolable } else { 0 };
-        self.normalisation.update(&drawn.ratios(), pooled_below);
+        self.normalisation.update(&drawn.ratios(), self.settings.normaliser == Normaliser::Pooled);
         if self.settings.allocation == Allocation::Measured && rungs > 1 {
             self.allocate(&drawn);
         }

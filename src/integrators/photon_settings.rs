@@ -52,7 +52,7 @@ pub enum CombineName {
 pub enum NormaliserName {
     /// Each iteration by itself
     Pass,
-    /// All iterations so far, where a rung's target stays; needs --alpha 1
+    /// All iterations since the targets last changed
     Pooled,
 }
 
@@ -233,8 +233,6 @@ impl LadderPlan {
                 NormaliserName::Pass => Normaliser::Pass,
                 NormaliserName::Pooled => Normaliser::Pooled,
             },
-            // Densities move the full target; the others stay while the radius does.
-            poolable: self.rungs.iter().filter(|rung| self.regions == RegionKind::None || **rung != Rung::Target).count(),
             ..defaults
         }
     }
@@ -328,12 +326,6 @@ impl PhotonSettings {
         }
         if chains.ensembles.is_some_and(|n| !(2..=4096).contains(&n)) {
             return Err("--ensembles must lie in 2..4096".into());
-        }
-        if chains.normaliser == Some(NormaliserName::Pooled) && self.alpha < 1.0 {
-            return Err(format!(
-                "--normaliser pooled needs --alpha 1: with alpha {} the radius shrinks, and what chains are normalised by with it",
-                self.alpha
-            ));
         }
         Ok(())
     }

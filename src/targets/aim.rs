@@ -1,9 +1,10 @@
 //! Target functions over measurement points.
 //!
 //! [STF (11), (12)]: a path's target is the largest value of the points it reaches; 0 where it reaches none, so that the supports of all rungs
-//! above the uniform one are the same.
+//! above the uniform one are the same. Here the points are represented by the cells they lie in (module `cells`).
 
-use super::points::Points;
+use super::cells::Cells;
+use super::points::{DepthRange, MeasurementPoint};
 use super::regions::{Refinement, Regions};
 use clap::ValueEnum;
 use glam::Vec3;
@@ -40,18 +41,22 @@ pub struct Aim {
 /// What turns kernel sizes and densities into targets, from iteration to iteration.
 #[derive(Clone, Debug)]
 pub struct Aimer {
-    /// Largest kernel size and mean kernel target of the first iteration, before the radius schedule: a fixed scale, so that a rung's
+    /// Largest kernel size and mean kernel target of the pilot, before the radius schedule: a fixed scale, so that a rung's
     /// normalisation means the same in every iteration. [STF (11)] takes the current maximum, which changes the target by a factor alone
     /// that no chain notices, and moves where it saturates.
     scale: Option<(f64, f64)>,
     /// Regions of a spatial or image target.
     pub regions: Option<Regions>,
+    /// Over what they are built.
+    place: Place,
     /// Where densities are read.
     refinement: Refinement,
     /// Compressed inverse densities by leaf, in a scale that gives the full target a mean of one when they are read; empty before.
     inverse_densities: Vec<f64>,
     /// Regions read.
     region_count: usize,
+    /// Where targets are positive, and what they are there.
+    cells: Cells,
     /// Iterations aimed.
     iterations: u64,
 }
@@ -69,8 +74,7 @@ pub enum Place {
 }
 
 impl Place {
-    fn of(self, points: &Points<'_>, index: usize) -> Vec3 {
-        let at = &points.all()[index];
+    fn of(self, at: &MeasurementPoint<'_>) -> Vec3 {
         match self {
             Place::Space => at.point.end.p,
             Place::Image { width } => Vec3::new((at.pixel % width) as f32 + 0.5, (at.pixel / width) as f32 + 0.5, 0.0),
@@ -79,9 +83,21 @@ impl Place {
 }
 
 impl Aimer {
-    /// Nothing known yet.
-    pub fn new(regions: Option<Regions>, refinement: Refinement) -> Self {
-        Self { scale: None, regions, refinement, inverse_densities: Vec::new(), region_count: 0, iterations: 0 }
+    /// Aims at a pilot's measurement points, of the first iteration's radii. Nothing is known of densities yet.
+    pub fn new(regions: Option<Regions>, place: Place, refinement: Refinement, depths: DepthRange, pilot: &[MeasurementPoint<'_>]) -> Self {
+        let mut aimer = Self {
+            scale: None,
+            regions,
+            place,
+            refinement,
+            inverse_densities: Vec::new(),
+            region_count: 0,
+            cells: Cells::new(depths),
+            iterations: 0,
+        };
+        let aims = aimer.aims(pilot, 1.0);
+        aimer.cells.add(pilot, &aims);
+        aimer
     }
 
     /// Regions that the present densities come from.
@@ -89,33 +105,55 @@ impl Aimer {
         self.region_count
     }
 
-    /// Targets at every point, and whether the full target is a new one. `shrink` is the radius schedule's factor on the first iteration's
-    /// radii.
+    /// Where the present targets are positive.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// Targets at an iteration's measurement points, and whether those of light paths are new ones. `shrink` is the radius schedule's factor on
+    /// the first iteration's radii.
     ///
-    /// Densities are read before iterations 1, 2, 4, 8, ... and stay in between. \[STF\] reads them before every iteration, which has a bias: where
-    /// chains have lingered the density is found too high and the target made low, while the chains still stand there and bring
-    /// more than the new target grants. Chains that are burnt in again at a new target forget that; at doubling intervals it costs little.
-    pub fn aim(&mut self, points: &Points<'_>, place: Place, shrink: f64) -> (Vec<Aim>, bool) {
-        let sizes: Vec<f64> = points.all().iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
+    /// The targets of light paths change before iterations 1, 2, 4, 8, ... and stay in between: densities are read, and the cells of this iteration's
+    /// points join those seen before. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
+    /// found too high and the target made low, while the chains still stand there and bring more than the new target grants; and places that
+    /// only the new points see have no states to begin with. Chains that are burnt in again forget both; at doubling intervals it costs little.
+    pub fn aim(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> (Vec<Aim>, bool) {
+        let new = self.iterations == 0 || self.iterations.is_power_of_two();
+        let mut aims = self.aims(points, shrink);
+        if new {
+            self.cells.add(points, &aims);
+            if self.read_densities(&aims) {
+                self.fill(&mut aims);
+            }
+            let inverse = &self.inverse_densities;
+            self.cells.set(|leaf| inverse.get(leaf as usize).copied().unwrap_or(1.0));
+        }
+        self.iterations += 1;
+        (aims, new)
+    }
+
+    fn aims(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> Vec<Aim> {
+        let sizes: Vec<f64> = points.iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
         if sizes.is_empty() {
-            return (Vec::new(), false);
+            return Vec::new();
         }
         let (largest, mean) = *self.scale.get_or_insert_with(|| {
             let largest = sizes.iter().copied().fold(0.0, f64::max);
             let mean = sizes.iter().map(|s| inverse(s / largest)).sum::<f64>() / sizes.len() as f64;
             (largest, mean)
         });
-        let mut aims: Vec<Aim> = sizes.iter().map(|s| Aim { kernel: (inverse(s / largest) / mean) as f32, ..Aim::default() }).collect();
-        if let Some(regions) = &self.regions {
-            aims.iter_mut().enumerate().for_each(|(i, aim)| aim.leaf = regions.leaf(place.of(points, i)));
-        }
-        let new = self.iterations.is_power_of_two() && self.read_densities(&aims);
-        self.iterations += 1;
-        // Nothing known: the full target starts as the kernel's.
-        for aim in &mut aims {
+        let leaf = |m| self.regions.as_ref().map_or(0, |regions| regions.leaf(self.place.of(m)));
+        let aim = |(m, size): (_, &f64)| Aim { kernel: (inverse(size / largest) / mean) as f32, full: 0.0, leaf: leaf(m) };
+        let mut aims = points.iter().zip(&sizes).map(aim).collect();
+        self.fill(&mut aims);
+        aims
+    }
+
+    /// Sets full targets; the kernel's while nothing is known of densities.
+    fn fill(&self, aims: &mut Vec<Aim>) {
+        for aim in aims {
             aim.full = self.inverse_densities.get(aim.leaf as usize).map_or(aim.kernel, |inverse| (f64::from(aim.kernel) * inverse) as f32);
         }
-        (aims, new)
     }
 
     /// Whether there were any.

@@ -1,31 +1,29 @@
 //! Light paths with what they reach: the space that a ladder of targets samples.
 
-use super::aim::{Aim, Rung};
+use super::aim::Rung;
+use super::cells::{CellSearch, Cells, Reached};
 use super::light_paths::{LightPath, LightPaths};
-use super::points::{Points, Search, Touch};
+use super::points::{Points, Search};
 use super::tallies::Tallies;
 use crate::samplers::{CELLS, LightPathSpace, Stream};
 
-/// A light path and the measurement points it reaches.
+/// A light path and what its vertices are worth.
 #[derive(Clone, Debug, Default)]
 pub struct AimedPath {
     /// The path.
     pub light: LightPath,
-    /// Pairs of its vertices and points that take them, in the order of vertices.
-    pub touches: Vec<Touch>,
-    /// Largest kernel and full target among the points; 0 where there is none.
-    best: Aim,
-    /// Sum of squared full targets over the pairs.
-    usefulness: f64,
-    search: Search,
+    reached: Reached,
+    search: CellSearch,
 }
 
-/// All light subpaths of a scene, aimed at an iteration's measurement points.
+/// All light subpaths of a scene, aimed at cells that hold measurement points.
 #[derive(Clone, Copy)]
 pub struct AimedPaths<'a> {
     /// The paths.
     pub light: LightPaths<'a>,
-    /// What they should reach, with targets.
+    /// Where they should go.
+    pub cells: &'a Cells,
+    /// The iteration's measurement points, with targets.
     pub points: &'a Points<'a>,
     /// The ladder, uniform first.
     pub rungs: &'a [Rung],
@@ -37,46 +35,40 @@ impl LightPathSpace for AimedPaths<'_> {
     type Path = AimedPath;
 
     fn trace<S: Stream>(&self, stream: &mut S, path: &mut AimedPath) {
-        let AimedPath { light, touches, best, usefulness, search } = path;
-        self.light.trace(stream, light);
-        self.tallies.add(&light.tally);
-        self.points.touched(&light.vertices, search, touches);
-        *best = Aim::default();
-        *usefulness = 0.0;
-        for touch in touches {
-            let aim = self.points.aim(touch.point);
-            best.kernel = best.kernel.max(aim.kernel);
-            best.full = best.full.max(aim.full);
-            *usefulness += f64::from(aim.full) * f64::from(aim.full);
-        }
+        self.light.trace(stream, &mut path.light);
+        self.tallies.add(&path.light.tally);
+        path.reached = self.cells.reached(&path.light.vertices, &mut path.search);
     }
 
     fn targets(&self, path: &AimedPath, values: &mut [f64]) {
-        let visible = if path.touches.is_empty() { 0.0 } else { 1.0 };
+        let visible = if path.reached.vertices > 0 { 1.0 } else { 0.0 };
         for (value, rung) in values.iter_mut().zip(self.rungs) {
             *value = match rung {
                 Rung::Uniform => 1.0,
                 Rung::Visibility => visible,
-                Rung::Kernel => f64::from(path.best.kernel),
-                Rung::Target => f64::from(path.best.full),
+                Rung::Kernel => f64::from(path.reached.kernel),
+                Rung::Target => f64::from(path.reached.full),
             };
         }
     }
 
     /// The full target is about `1/P_k`, so its square is the squared contribution over the squared mean, summed over the points reached: what
-    /// a path adds to the sum of relative variances at density one ([STF (14), (15)] under the assumptions of its 3.2).
+    /// a path adds to the sum of relative variances at density one ([STF (14), (15)] under the assumptions of its 3.2). Asked for a few
+    /// paths only.
     fn usefulness(&self, path: &AimedPath) -> f64 {
-        path.usefulness
+        let mut touches = Vec::new();
+        self.points.touched(&path.light.vertices, &mut Search::default(), &mut touches);
+        touches.iter().map(|touch| f64::from(self.points.aim(touch.point).full).powi(2)).sum()
     }
 
     fn cell(&self, path: &AimedPath) -> Option<u32> {
-        // Neighbouring points go to unrelated cells.
-        let touch = path.touches.first()?;
-        Some(touch.point.wrapping_mul(0x9e37_79b9) >> (u32::BITS - CELLS.ilog2()))
+        // Neighbours go to unrelated cells.
+        let number = path.reached.cell.wrapping_mul(0x9e37_79b9) >> (u32::BITS - CELLS.ilog2());
+        (path.reached.vertices > 0).then_some(number)
     }
 
-    /// Rays, and deposits at a fifth of a ray.
+    /// Rays, and what is done at points: half a ray for a vertex that counts.
     fn cost(&self, path: &AimedPath) -> f64 {
-        path.light.tally.rays as f64 + 0.2 * path.touches.len() as f64
+        path.light.tally.rays as f64 + 0.5 * f64::from(path.reached.vertices)
     }
 }

@@ -1,7 +1,7 @@
 //! What light paths leave at measurement points and in regions, summed in one order whatever the number of threads.
 
 use super::aimed::AimedPath;
-use super::points::Points;
+use super::points::{Points, Search, Touch};
 use super::regions::Half;
 use crate::math::Rgb;
 use crate::samplers::{Draw, Drawn};
@@ -28,6 +28,9 @@ pub struct Deposits {
     psi: Vec<Vec<f64>>,
     /// Per leaf: paths that contributed.
     paths: Vec<f64>,
+    /// Pairs of the path at hand.
+    touches: Vec<Touch>,
+    search: Search,
     /// What tracing cost and gave up.
     pub tally: Tally,
 }
@@ -40,15 +43,18 @@ impl Deposits {
             points_a_list: points.div_ceil(LISTS).max(1) as u32,
             psi: vec![vec![0.0; leaves]; strata],
             paths: vec![0.0; leaves],
+            touches: Vec::new(),
+            search: Search::default(),
             tally: Tally::default(),
         }
     }
 
     /// Takes a path as the sampler hands it out.
     pub fn add(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
+        points.touched(&path.light.vertices, &mut self.search, &mut self.touches);
         if drawn.weight > 0.0 {
-            path.touches.iter().for_each(|touch| points.fetch(touch.point));
-            for touch in &path.touches {
+            self.touches.iter().for_each(|touch| points.fetch(touch.point));
+            for touch in &self.touches {
                 let value = points.value(touch.point, &path.light.vertices[touch.vertex as usize]) * drawn.weight as f32;
                 let value = self.tally.finite(value);
                 let list = &mut self.lists[(touch.point / self.points_a_list) as usize];
@@ -56,15 +62,15 @@ impl Deposits {
             }
         }
         if drawn.pilot_weight > 0.0 && !self.paths.is_empty() {
-            self.learn(points, path, drawn);
+            self.learn(points, drawn);
         }
     }
 
     /// A path counts once a point, however many of its vertices lie there: `P_k` is a probability.
-    fn learn(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
+    fn learn(&mut self, points: &Points<'_>, drawn: Drawn) {
         let psi = &mut self.psi[drawn.stratum];
-        for (i, touch) in path.touches.iter().enumerate() {
-            let before = &path.touches[..i];
+        for (i, touch) in self.touches.iter().enumerate() {
+            let before = &self.touches[..i];
             if before.iter().any(|earlier| earlier.point == touch.point) {
                 continue;
             }

@@ -2,6 +2,7 @@
 
 pub mod aim;
 pub mod aimed;
+pub mod cells;
 pub mod deposits;
 pub mod light_paths;
 pub mod points;

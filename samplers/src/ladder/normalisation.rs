@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub(super) struct Normalisation {
     /// `b'` of the next draw's weights; empty before the first.
     pub(super) assumed: Vec<f64>,
-    /// Ratios `b_{c+1}/b_c`, c from 0, summed over draws.
+    /// Ratios `b_{c+1}/b_c`, c from 0, summed over the draws at these targets.
     pooled: Vec<Mean>,
     /// `b` of the last draw and its relative variance.
     estimates: Vec<(f64, f64)>,
@@ -30,16 +30,20 @@ impl Normalisation {
         }
     }
 
-    /// Takes a draw's ratios; those of rungs below `pooled_below` are used pooled. A ratio that the draw has no step for is taken
-    /// from the assumed normalisations.
-    pub(super) fn update(&mut self, ratios: &[Mean], pooled_below: usize) {
+    /// The targets are others from now on. What is assumed stays: any positive numbers are right.
+    pub(super) fn forget(&mut self) {
+        self.pooled.fill(Mean::default());
+    }
+
+    /// Takes a draw's ratios. A ratio that the draw has no step for is taken from the assumed normalisations.
+    pub(super) fn update(&mut self, ratios: &[Mean], use_pooled: bool) {
         for (pooled, ratio) in self.pooled.iter_mut().zip(ratios) {
             pooled.add(ratio);
         }
         let mut estimate = (1.0, 0.0);
         self.estimates = vec![estimate];
         for (c, ratio) in ratios.iter().enumerate() {
-            let used = if c + 1 < pooled_below { &self.pooled[c] } else { ratio };
+            let used = if use_pooled { &self.pooled[c] } else { ratio };
             let mean = used.mean().unwrap_or_else(|| self.assumed[c + 1] / self.assumed[c]);
             estimate = (estimate.0 * mean, estimate.1 + used.relative_variance());
             self.estimates.push(estimate);

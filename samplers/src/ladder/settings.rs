@@ -30,10 +30,10 @@ pub enum Allocation {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Normaliser {
-    /// This draw alone: right for targets that change from draw to draw.
+    /// This draw alone.
     #[default]
     Pass,
-    /// All draws so far, for rungs below [`LadderSettings::poolable`]: less noise; exact only as far as the targets stay.
+    /// All draws since the targets last changed ([`Ladder::retargeted`](crate::Ladder::retargeted)): less noise.
     Pooled,
 }
 
@@ -48,9 +48,9 @@ pub struct LadderSettings {
     /// Independent groups of chains, one chain a rung: at least one (0 counts as 1). Work is shared between threads by ensemble, and
     /// standard errors, dispersion and R-hat compare ensembles.
     pub ensembles: usize,
-    /// Steps of every rung that are thrown away at the start of the first draw, and of a draw after [`Ladder::retargeted`](crate::Ladder::retargeted).
+    /// Steps of every rung that are thrown away at the start of the first draw.
     pub first_burn_in: u64,
-    /// The same at the start of every later draw.
+    /// The same at the start of a draw after [`Ladder::retargeted`](crate::Ladder::retargeted).
     pub later_burn_in: u64,
     /// Acceptance that step sizes are steered to, in (0, 1).
     pub acceptance: f64,
@@ -62,8 +62,6 @@ pub struct LadderSettings {
     pub allocation: Allocation,
     /// Which draws normalisations come from.
     pub normaliser: Normaliser,
-    /// Rungs below this number have targets whose normalisation may be pooled over draws.
-    pub poolable: usize,
     /// Independent paths of the first draw from which chains start and the first normalisations come.
     pub start_up: u64,
 }
@@ -75,13 +73,12 @@ impl Default for LadderSettings {
             rungs: 4,
             ensembles: 16,
             first_burn_in: 1000,
-            later_burn_in: 0,
+            later_burn_in: 1000,
             acceptance: 0.234,
             redraw: 0.15,
             combine: Combine::Mis,
             allocation: Allocation::Fixed,
             normaliser: Normaliser::Pass,
-            poolable: 0,
             start_up: 100_000,
         }
     }

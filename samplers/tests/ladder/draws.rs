@@ -4,7 +4,7 @@ use crate::kit::{Square, assert_mean, everything, integrals, settings};
 use isophote_samplers::{Allocation, Combine, Ladder, LadderSettings, LightPathSpace, Normaliser, Stream};
 
 fn full(seed: u64) -> LadderSettings {
-    LadderSettings { allocation: Allocation::Measured, normaliser: Normaliser::Pooled, poolable: 3, later_burn_in: 3, ..settings(seed, 4) }
+    LadderSettings { allocation: Allocation::Measured, normaliser: Normaliser::Pooled, later_burn_in: 3, ..settings(seed, 4) }
 }
 
 /// All bits of what a ladder hands out.
@@ -37,7 +37,9 @@ fn the_number_of_threads_changes_nothing() {
 fn a_stored_ladder_goes_on_with_the_same_bits() {
     let mut ladder = Ladder::new(full(2));
     bits(&mut ladder, 0, 5000);
+    ladder.retargeted();
     bits(&mut ladder, 1, 5001);
+    ladder.retargeted();
     let stored = serde_json::to_string(&ladder).unwrap();
     let mut again: Ladder = serde_json::from_str(&stored).unwrap();
     assert_eq!(ladder, again);
@@ -120,6 +122,7 @@ fn states_carried_over_to_other_targets_leave_estimates_unbiased() {
             let mut ladder = Ladder::new(LadderSettings { combine, ..settings(seed + 100 * k as u64, 4) });
             for (i, low) in places.into_iter().enumerate() {
                 let space = Moving { low: Some(low) };
+                ladder.retargeted();
                 let mean = |p: &[f32; 2]| [if space.usefulness(p) > 0.0 { f64::from(p[0]) } else { 0.0 }];
                 values[i].push(integrals(&mut ladder, &space, i as u64, 20_000, |drawn| drawn.weight, mean)[0]);
             }
@@ -142,6 +145,7 @@ fn where_nothing_is_visible_everything_stays_finite() {
             for allocation in [Allocation::Fixed, Allocation::Measured] {
                 let mut ladder = Ladder::new(LadderSettings { combine, allocation, ..settings(9, rungs) });
                 for (iteration, low) in [None, None, Some(0.3), None, Some(0.5)].into_iter().enumerate() {
+                    ladder.retargeted();
                     let draw = everything(&mut ladder, &Moving { low }, iteration as u64, 4000);
                     assert!(draw.scales.iter().all(|scale| scale.is_finite() && *scale >= 0.0));
                     for (_, drawn) in draw.batches.iter().flatten() {

@@ -12,36 +12,42 @@ use crate::samplers::{Ladder, PhotonSampler};
 use crate::targets::aim::{Aimer, Place, Rung};
 use crate::targets::aimed::AimedPaths;
 use crate::targets::deposits::{Deposits, collect};
-use crate::targets::points::Points;
+use crate::targets::points::{MeasurementPoint, Points};
 use crate::targets::regions::Regions;
 use crate::targets::tallies::Tallies;
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
 
-/// Camera paths a pixel in the pilot that the regions are built over [STF 4.2].
+/// Camera paths a pixel in the pilot that targets and regions [STF 4.2] are built over.
 const PILOT: u64 = 4;
 
 /// A ladder and what it aims at, from iteration to iteration.
 pub(super) struct Aimed {
     ladder: Ladder,
-    aimer: Aimer,
+    /// Set by [`Aimed::prepare`].
+    aimer: Option<Aimer>,
     rungs: Vec<Rung>,
     regions: RegionKind,
 }
 
 impl Aimed {
     pub(super) fn new(settings: &PhotonSettings, plan: &LadderPlan, seed: u64) -> Self {
-        let aimer = Aimer::new(None, settings.refinement());
-        Self { ladder: Ladder::new(plan.settings(settings, seed)), aimer, rungs: plan.rungs.clone(), regions: plan.regions }
+        Self { ladder: Ladder::new(plan.settings(settings, seed)), aimer: None, rungs: plan.rungs.clone(), regions: plan.regions }
     }
 
-    /// Builds the tree of regions.
+    /// Looks where the camera measures, and builds the tree of regions.
     pub(super) fn prepare(&mut self, sppm: &Sppm<'_>, stats: &mut IterationStats) {
-        self.aimer.regions = match self.regions {
+        self.aimer = Some(self.aimer(sppm, stats));
+    }
+
+    fn aimer(&self, sppm: &Sppm<'_>, stats: &mut IterationStats) -> Aimer {
+        let pilot = pilot(&sppm.eye, sppm.radius_at(0), stats);
+        let regions = match self.regions {
             RegionKind::None => None,
             RegionKind::Image => Some(Regions::image(sppm.eye.size.0, sppm.eye.size.1)),
-            RegionKind::Space => Some(Regions::spatial(pilot(&sppm.eye, stats))),
+            RegionKind::Space => Some(Regions::spatial(pilot.iter().map(|m| m.point.end.p).collect())),
         };
+        Aimer::new(regions, self.place(&sppm.eye), sppm.settings.refinement(), sppm.eye.depths(), &pilot)
     }
 
     fn place(&self, eye: &Eye<'_>) -> Place {
@@ -56,15 +62,16 @@ impl Aimed {
         let (mut values, mut points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
-        let (aims, new) = self.aimer.aim(&points, self.place(&sppm.eye), shrink(i, sppm.settings.alpha));
+        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, stats));
+        let (aims, new) = aimer.aim(points.all(), shrink(i, sppm.settings.alpha));
         if new {
             self.ladder.retargeted();
         }
         points.set_aims(aims.iter().copied());
         let light = sppm.light_paths();
         let tallies = Tallies::default();
-        let space = AimedPaths { light, points: &points, rungs: &self.rungs, tallies: &tallies };
-        let leaves = self.aimer.regions.as_ref().map_or(0, Regions::leaves);
+        let space = AimedPaths { light, cells: aimer.cells(), points: &points, rungs: &self.rungs, tallies: &tallies };
+        let leaves = aimer.regions.as_ref().map_or(0, Regions::leaves);
         let (count, strata) = (points.all().len(), self.ladder.strata());
         let start = || Deposits::new(count, strata, leaves);
         let paths = if light.max_depth == 0 { 0 } else { sppm.photon_count };
@@ -75,11 +82,13 @@ impl Aimed {
         let (sums, halves) = collect(&draw, count);
 
         // Statistics for the next iteration's target.
-        if let Some(regions) = &mut self.aimer.regions {
+        if let Some(regions) = &mut aimer.regions {
             let mut sizes = vec![0.0; leaves];
             points.all().iter().zip(&aims).for_each(|(m, aim)| sizes[aim.leaf as usize] += f64::from(m.kernel_size()));
             regions.add(&sizes, [&halves[0], &halves[1]]);
         }
+
+        self.aimer = Some(aimer);
 
         // The image.
         for (at, sum) in points.all().iter().zip(sums) {
@@ -95,8 +104,8 @@ impl Aimed {
 
     /// The ladder's diagnostics and the number of regions.
     pub(super) fn report(&self) -> ChainReport {
-        let report = |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.region_count() };
-        ChainReport { names: self.rungs.clone(), ladder: self.ladder.report(), regions: self.aimer.regions.as_ref().map(report) }
+        let report = |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.as_ref().map_or(0, Aimer::region_count) };
+        ChainReport { names: self.rungs.clone(), ladder: self.ladder.report(), regions: self.aimer.as_ref().and_then(|aimer| aimer.regions.as_ref()).map(report) }
     }
 }
 
@@ -125,21 +134,21 @@ fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats)
     (values, Points::new(points, eye.depths(), eye.threshold), all)
 }
 
-/// Positions of measurement points, some a pixel.
-fn pilot(eye: &Eye<'_>, stats: &mut IterationStats) -> Vec<glam::Vec3> {
+/// Measurement points, some a pixel.
+fn pilot<'a>(eye: &Eye<'a>, radius: Radius, stats: &mut IterationStats) -> Vec<MeasurementPoint<'a>> {
     let row = |y: usize| {
         let mut tally = Tally::default();
         let pixels = y * eye.size.0..(y + 1) * eye.size.0;
         let samples = pixels.flat_map(|pixel| (0..PILOT).map(move |number| (pixel, number)));
-        let found: Vec<_> = samples.filter_map(|(pixel, number)| eye.pilot(number, pixel, &mut tally)).map(|m| m.point.end.p).collect();
+        let found: Vec<_> = samples.filter_map(|(pixel, number)| eye.pilot(number, pixel, radius, &mut tally)).collect();
         (found, tally)
     };
     let rows: Vec<_> = (0..eye.size.1).into_par_iter().map(row).collect();
     stats.camera_paths += PILOT * eye.pixels() as u64;
-    let mut positions = Vec::new();
+    let mut points = Vec::new();
     for (found, tally) in rows {
-        positions.extend(found);
+        points.extend(found);
         stats.count(&tally);
     }
-    positions
+    points
 }

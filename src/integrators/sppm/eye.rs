@@ -72,11 +72,11 @@ impl<'a> Eye<'a> {
     }
 
     /// The `number`-th subpath of a pixel in a pilot, on streams that no iteration uses.
-    pub(super) fn pilot(&self, number: u64, pixel: usize, tally: &mut Tally) -> Option<MeasurementPoint<'a>> {
+    pub(super) fn pilot(&self, number: u64, pixel: usize, radius: Radius, tally: &mut Tally) -> Option<MeasurementPoint<'a>> {
         let mut stream = pixel_stream(self.common.seed, number + 1, pixel, Purpose::Pilot);
         let jitter = Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
-        self.measure(pixel, jitter, lens, Radius::Footprints(1.0), &mut stream, tally).measured
+        self.measure(pixel, jitter, lens, radius, &mut stream, tally).measured
     }
 
     fn measure<S: Stream>(&self, pixel: usize, jitter: Vec2, lens: Vec2, radius: Radius, stream: &mut S, tally: &mut Tally) -> Seen<'a> {
