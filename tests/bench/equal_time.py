@@ -10,9 +10,12 @@ program is wall time, so iterations are calibrated once for each variant instead
 corrected run by run: an error is multiplied by (CPU seconds / budget)^alpha, alpha the radius schedule's, since that is how noise falls; with
 --iterations the budget is one second, so that errors are errors times time. The table shows CPU seconds as they were, and warns beyond 10 %.
 
-relMSE, NSD, cv, noise and floor: see runs.py. Nothing is subtracted from what is called relMSE. `bias` is relMSE less noise less the reference's floor.
+relMSE, NSD, cv, noise and floor: see runs.py. Nothing is subtracted from what is called relMSE. `bias` is the mean relMSE as rendered less noise and less the
+reference's floor, `floor` that floor's share. `cv` is the median over runs, `cv all` that of errors averaged over seeds; `spread b` the relative
+standard deviation over seeds of the last rung's normalisation (in the run's last draw).
 A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree, otherwise the reference is
-too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU seconds a light path.
+too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU seconds a light path traced;
+`cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count.
 Seeds are added until every pair's interval is narrow (paired.py) or there are --most-seeds. `means` is the ratio of the means over seeds, by bootstrap:
 far from the ratio, it tells of rare bad seeds.
 
@@ -28,7 +31,7 @@ import numpy as np
 import paired
 import runs
 
-PER_SEED = ("relmse", "rmse", "cv", "cost")
+PER_SEED = ("relmse", "rmse", "cv", "cost", "cost_kept")
 
 
 def say(text):
@@ -52,6 +55,8 @@ class Measured:
     def values(self, metric, name, floor=0.0):
         if metric == "cost":
             return self.rounds.column(name, "cpu_seconds") / self.rounds.column(name, "light_paths")
+        if metric == "cost_kept":
+            return self.rounds.column(name, "cpu_seconds") / (self.rounds.column(name, "photons") * self.rounds.column(name, "iterations"))
         found = np.array([e[metric] for e in self.errors[name]], dtype=float)
         if metric == "relmse":
             return (found - floor) * self.mismatch(name)
@@ -84,17 +89,17 @@ class Measured:
         noise = runs.noise(self.stacks[name], self.reference) if many else None
         raw = np.mean([e["relmse"] for e in self.errors[name]])
         return {"iterations": self.rounds.iterations[name], "cpu_seconds": float(np.median(cpu)), "relmse": float(np.median(relmse)),
-                "relmse_as_rendered": float(raw), "noise": noise, "floor": self.floor,
+                "relmse_as_rendered": float(raw), "noise": float(noise * np.mean(self.mismatch(name))) if many else None, "floor": self.floor,
                 "bias": float(raw - noise - (self.floor or 0)) if many else None, "rmse": float(np.median(self.values("rmse", name))),
                 "nsd": float(self.nsd(name)) if many else None, "cv": float(np.median(self.values("cv", name))),
                 "cv_pooled": runs.pooled_cv(self.stacks[name], self.reference), "paths_per_cpu_second": float(np.median(self.rounds.column(name, "light_paths") / cpu)),
-                "peak_bytes": int(np.max(self.rounds.column(name, "peak_bytes"))), "mean": float(self.stacks[name].mean()),
+                "mean": float(self.stacks[name].mean()),
                 "b": {r: float(np.mean([x[name]["b"][r] for x in self.rounds.rounds])) for r in (self.rounds.rounds[0][name]["b"])},
                 "b_spread": float(last.std(ddof=1) / last.mean()) if last is not None and many and last.mean() > 0 else None,
                 "masked": int(max(e["masked"] for e in self.errors[name]))}
 
 
-HEAD = ["", "iters", "CPU s", "relMSE", "noise", "bias", "floor", "RMSE", "NSD", "cv", "cv all", "kpaths/s", "MB", "spread b"]
+HEAD = ["", "iters", "CPU s", "relMSE", "noise", "bias", "floor", "RMSE", "NSD", "cv", "cv all", "kpaths/s", "spread b"]
 
 
 def table(measured):
@@ -106,7 +111,7 @@ def table(measured):
         share = None if measured.floor is None else measured.floor / r["relmse_as_rendered"]
         lines.append([name, str(r["iterations"]), cell(r["cpu_seconds"], ".2f"), cell(r["relmse"], ".3g"), cell(r["noise"], ".3g"), cell(r["bias"], ".2g"),
                       cell(share, ".1%"), cell(r["rmse"], ".3g"), cell(r["nsd"], ".3f"), cell(r["cv"], ".3f"), cell(r["cv_pooled"], ".3f"),
-                      cell(r["paths_per_cpu_second"] / 1e3, ".0f"), cell(r["peak_bytes"] / 2 ** 20, ".0f"), cell(r["b_spread"], ".1%")])
+                      cell(r["paths_per_cpu_second"] / 1e3, ".0f"), cell(r["b_spread"], ".1%")])
     width = [max(len(line[i]) for line in [HEAD, *lines]) for i in range(len(HEAD))]
     return "\n".join("  ".join(x.rjust(w) if i else x.ljust(w) for i, (x, w) in enumerate(zip(line, width))) for line in [HEAD, *lines])
 
@@ -121,6 +126,8 @@ def warnings(measured):
             yield "the reference has no variance: its floor is unknown and nothing guards against it"
         elif measured.floor > 0.1 * r["relmse_as_rendered"]:
             yield f"{name}: the reference's noise is {measured.floor / r['relmse_as_rendered']:.0%} of relMSE"
+        if r["bias"] is not None and r["bias"] > 0.2 * r["relmse_as_rendered"]:
+            yield f"{name}: bias is {r['bias'] / r['relmse_as_rendered']:.0%} of relMSE; where methods share it, it draws ratios to 1"
         if r["masked"]:
             yield f"{name}: up to {r['masked']} pixels not finite, left out"
 

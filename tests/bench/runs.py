@@ -17,7 +17,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 
 import numpy as np
 
@@ -46,18 +45,17 @@ class Program:
         with open(path, "rb") as f:
             self.hash = hashlib.sha256(f.read()).hexdigest()
 
-    def render(self, scene, options, seed, iterations, output, threads=1):
-        """One render of `sppm`: the document of --json with `peak_bytes` (largest resident memory) added."""
-        command = [self.path, "render", "sppm", scene, "--threads", str(threads), "--iterations", str(iterations), "--seed", str(seed), "-q", "--json",
-                   "-o", output, *options]
-        with tempfile.TemporaryFile("w+") as told:
-            process = subprocess.Popen(command, stdout=told)
-            _, status, usage = os.wait4(process.pid, 0)
-            process.returncode = os.waitstatus_to_exitcode(status)
-            if process.returncode:
-                raise SystemExit(f"{' '.join(command)}\nended with {process.returncode}")
-            told.seek(0)
-            return json.load(told) | {"peak_bytes": usage.ru_maxrss * 1024}
+    def command(self, scene, options, seed, iterations, output, threads=1):
+        return [self.path, "render", "sppm", scene, "--threads", str(threads), "--iterations", str(iterations), "--seed", str(seed), "-q", "--json",
+                "-o", output, *options]
+
+    def render(self, *arguments):
+        """One render of `sppm`: the document of --json."""
+        command = self.command(*arguments)
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
+        if done.returncode:
+            raise SystemExit(f"{' '.join(command)}\nended with {done.returncode}")
+        return json.loads(done.stdout)
 
 
 def normalisations(document):
@@ -121,14 +119,16 @@ def pooled_cv(stack, reference):
 
 def calibrated(render, budget):
     """Iterations that take `budget` CPU seconds. `render(n)` returns the CPU seconds of n iterations. A start-up, and early iterations that
-    cost more, are told from the rest by two renders."""
+    cost more, are told from the rest by two renders; a third of the whole length corrects the line through them."""
     short = render(2)
     n = max(6, round(0.3 * budget / (short / 2)))
     long = render(n)
     each = (long - short) / (n - 2)
     if each <= 0:
         each = long / n
-    return max(1, round(n + (budget - long) / each))
+    n = max(1, round(n + (budget - long) / each))
+    whole = render(n)
+    return n if abs(whole / budget - 1) < 0.03 else max(1, round(n + (budget - whole) / each))
 
 
 class Rounds:
@@ -175,7 +175,8 @@ class Rounds:
         found = {}
         for name in names[::-1] if k % 2 else names:
             document = self.one(name, self.first_seed + k, self.iterations[name])
-            found[name] = {key: document[key] for key in ("cpu_seconds", "light_paths", "peak_bytes", "rejected", "non_finite_pixels")}
+            found[name] = {key: document[key] for key in ("cpu_seconds", "light_paths", "rejected", "non_finite_pixels")}
+            found[name]["iterations"] = self.iterations[name]
             found[name] |= {"alpha": document["settings"]["alpha"], "photons": document["settings"].get("photons"), "b": normalisations(document)}
         self.rounds.append(found)
         self.save()
