@@ -111,7 +111,8 @@ def paths(rows, peers):
         low, high = peers["paths"][sampler]
         ratios = min(ours) / low, max(ours) / high
         verdict = "met" if min(ratios) >= peers["paths_mark"] else "missed"
-        print(f"  {sampler:10s} {min(ours):.0f} to {max(ours):.0f}, theirs {low} to {high}: {ratios[0]:.2f} and {ratios[1]:.2f} times, mark {peers['paths_mark']:g}: {verdict}")
+        print(f"  {sampler:10s} {min(ours):.0f} to {max(ours):.0f}, theirs {low} to {high}: {ratios[0]:.2f} and {ratios[1]:.2f} times, "
+              f"mark {peers['paths_mark']:g}: {verdict}")
         found.append({"sampler": sampler, "lowest": min(ours), "highest": max(ours), "theirs": [low, high], "ratios": ratios, "verdict": verdict})
     return found
 

@@ -41,6 +41,8 @@ def from_root(path):
 
 class Program:
     def __init__(self, path):
+        if not os.path.exists(path):
+            raise SystemExit(f"{path} is not there: build it (cargo build --release), or name another with --program or ISOPHOTE")
         self.path = path
         with open(path, "rb") as f:
             self.hash = hashlib.sha256(f.read()).hexdigest()

@@ -4,8 +4,9 @@
   scaling.py [--program target/release/isophote] [--rounds 5] [--iterations 64] [--whole] -- path SCENE.xml [OPTION ...]
 
 Each round renders N iterations on two threads, and, at once, N/2 iterations in each of two processes on one thread each: the same
-work. With --whole each of the two processes renders all N, with a seed of its own, and two threads' time counts twice: for methods that
-cannot begin in the middle, such as `sppm` with a Metropolis sampler, whose start-up and updates are then in both. Compared is the render time alone (`seconds` of --json), without loading. Since the two alternate, drifts of the machine cancel.
+work. With --whole each of the two processes renders all N, with a seed of its own, and two threads render both, one after the other: for
+methods that cannot begin in the middle, such as `sppm` with a Metropolis sampler, whose start-up and updates are then in both. Compared is
+the render time alone (`seconds` of --json), without loading. Since the two alternate, drifts of the machine cancel.
 
 Prints JSON: the seconds of every round and `ratio` = what two threads reach of what two processes reach (median of the rounds'
 ratios, and their range): 1 says that nothing is lost between threads.
@@ -44,8 +45,7 @@ def main():
         out = [os.path.join(folder, f"{k}.exr") for k in range(2)]
         for r in range(a.rounds):
             if a.whole:
-                # Two threads need twice this for what the pair renders.
-                threads.append(2 * statistics.mean(seconds(start(a.program, a.render, 2, 0, 2 * half, 2 * r + k, out[0])) for k in range(2)))
+                threads.append(sum(seconds(start(a.program, a.render, 2, 0, 2 * half, 2 * r + k, out[0])) for k in range(2)))
                 pair = [start(a.program, a.render, 1, 0, 2 * half, 2 * r + k, out[k]) for k in range(2)]
             else:
                 threads.append(seconds(start(a.program, a.render, 2, 0, 2 * half, 0, out[0])))
