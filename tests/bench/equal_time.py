@@ -13,8 +13,8 @@ corrected run by run: an error is multiplied by (CPU seconds / budget)^alpha, al
 relMSE, NSD, cv, noise and floor: see runs.py. Nothing is subtracted from what is called relMSE. `bias` is the mean relMSE as rendered less noise and less the
 reference's floor, `floor` that floor's share. `cv` is the median over runs, `cv all` that of errors averaged over seeds; `spread b` the relative
 standard deviation over seeds of the last rung's normalisation (in the run's last draw).
-A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree, otherwise the reference is
-too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU seconds a light path traced;
+A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree and
+the floor is less than half of relMSE, otherwise the reference is too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU seconds a light path traced;
 `cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count.
 Seeds are added until every pair's interval is narrow (paired.py) or there are --most-seeds. `means` is the ratio of the means over seeds, by bootstrap:
 far from the ratio, it tells of rare bad seeds.
@@ -76,7 +76,9 @@ class Measured:
         if pair.metric == "relmse" and self.floor is not None:
             less = paired.ratio(self.values("relmse", pair.a, self.floor), self.values("relmse", pair.b, self.floor))
             found["less_floor"] = less
-            if paired.verdict(less, pair.bound) != found["verdict"]:
+            # The floor is an expectation: where it is most of the error, what is left after it is chance, shared by all seeds.
+            drowned = any(self.floor > 0.5 * np.mean([e["relmse"] for e in self.errors[name]]) for name in (pair.a, pair.b))
+            if drowned or paired.verdict(less, pair.bound) != found["verdict"]:
                 found["verdict"] = "undecided (floor)"
             found["narrow"] = found["narrow"] and pair.narrow(less)
         return found
@@ -208,7 +210,8 @@ def main():
     p.add_argument("-o", "--output", metavar="FOLDER")
     a = p.parse_intermixed_args()
     if a.self_test:
-        return paired.self_test()
+        import test_equal_time
+        return paired.self_test() + test_equal_time.test()
     if not a.output:
         p.error("-o names the folder of images and results")
     if a.section:

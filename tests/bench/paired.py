@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Ratios of two methods over seeds: intervals, the rule that adds seeds, verdicts. The unit is the seed; A[i] and B[i] share one.
 
 The ratio is the geometric mean of A[i]/B[i]; its interval is Student's t on the logarithms. Beside it stands the ratio of the arithmetic means with
