@@ -6,18 +6,20 @@
   equal_time.py --self-test                                                                        the statistics, on known ratios
 
 Time is the processor time of rendering as `--json` tells it (start-up, burn-in and updates of targets included; loading not). `--time` of the
-program is wall time, so iterations are calibrated once for each variant instead, on seed 0, which measures nothing else. What mismatch is left is
-corrected run by run: an error is multiplied by (CPU seconds / budget)^alpha, alpha the radius schedule's, since that is how noise falls; with
---iterations the budget is one second, so that errors are errors times time. The table shows CPU seconds as they were, and warns beyond 10 %.
+program is wall time, so iterations are calibrated once for each variant instead, on seed 0, which measures nothing else (some two rounds and a half).
+What mismatch is left is corrected run by run: an error is multiplied by (CPU seconds / budget)^alpha, alpha the radius schedule's, since that is how
+noise falls; with --iterations the budget is one second, so that errors are errors times time. The table shows CPU seconds as they were, and a note
+tells of more than 10 %.
 
-relMSE, NSD, cv, noise and floor: see runs.py. Nothing is subtracted from what is called relMSE. `bias` is the mean relMSE as rendered less noise and less the
-reference's floor, `floor` that floor's share. `cv` is the median over runs, `cv all` that of errors averaged over seeds; `spread b` the relative
-standard deviation over seeds of the last rung's normalisation (in the run's last draw).
-A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree and
-the floor is less than half of relMSE, otherwise the reference is too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU seconds a light path traced;
-`cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count.
-Seeds are added until every pair's interval is narrow (paired.py) or there are --most-seeds. `means` is the ratio of the means over seeds, by bootstrap:
-far from the ratio, it tells of rare bad seeds.
+relMSE, NSD, cv, noise and floor: see runs.py. Nothing is subtracted from what is called relMSE. `bias` is the mean relMSE as rendered less noise and
+less the reference's floor, `floor` that floor's share. `cv` is the median over runs, `cv all` that of errors averaged over seeds; `spread b` the
+relative standard deviation over seeds of the last rung's normalisation (in the run's last draw).
+
+A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree and the floor is less than half
+of relMSE, otherwise the reference is too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU
+seconds a light path traced; `cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count. Seeds are added
+until every pair's interval is narrow (paired.py) or there are --most-seeds. `means` is the ratio of the means over seeds, by bootstrap: far from the
+ratio, it tells of rare bad seeds.
 
 A scene that is not there is left out, and said. Exit status 1 if a pair is missed or undecided.
 """

@@ -119,18 +119,22 @@ def pooled_cv(stack, reference):
     return reference.tile_cv(((stack - reference.mean) ** 2).mean(axis=0), reference.good)
 
 
-def calibrated(render, budget):
-    """Iterations that take `budget` CPU seconds. `render(n)` returns the CPU seconds of n iterations. A start-up, and early iterations that
-    cost more, are told from the rest by two renders; a third of the whole length corrects the line through them."""
-    short = render(2)
-    n = max(6, round(0.3 * budget / (short / 2)))
-    long = render(n)
-    each = (long - short) / (n - 2)
-    if each <= 0:
-        each = long / n
-    n = max(1, round(n + (budget - long) / each))
-    whole = render(n)
-    return n if abs(whole / budget - 1) < 0.03 else max(1, round(n + (budget - whole) / each))
+def calibrated(renders, budget):
+    """Iterations by name that take `budget` CPU seconds; `renders[name](n)` returns the CPU seconds of n iterations. A start-up, and early
+    iterations that cost more, are told from the rest by a short and a longer render; then come two rounds of full length, names in turn, so that a
+    change of the machine's speed meets all alike, and their mean corrects the number."""
+    iterations = {}
+    for name, render in renders.items():
+        short = render(2)
+        n = max(6, round(0.3 * budget / (short / 2)))
+        long = render(n)
+        each = (long - short) / (n - 2) if long > short else long / n
+        iterations[name] = max(1, round(n + (budget - long) / each))
+    rounds = [{name: render(iterations[name]) for name, render in renders.items()} for _ in range(2)]
+    for name in renders:
+        mean = (rounds[0][name] + rounds[1][name]) / 2
+        iterations[name] = max(1, round(iterations[name] + (budget - mean) * iterations[name] / mean))
+    return iterations
 
 
 class Rounds:
@@ -155,7 +159,7 @@ class Rounds:
             self.rounds, self.iterations = kept["rounds"], kept["iterations"]
         if self.iterations is None:
             # Seed 0 is the calibration's alone.
-            self.iterations = {name: calibrated(lambda n: self.one(name, 0, n)["cpu_seconds"], budget) for name in variants}
+            self.iterations = calibrated({name: lambda n, name=name: self.one(name, 0, n)["cpu_seconds"] for name in variants}, budget)
             self.save()
 
     def image(self, name, seed):
