@@ -96,7 +96,8 @@ class Measured:
                 "relmse_as_rendered": float(raw), "noise": float(noise * np.mean(self.mismatch(name))) if many else None, "floor": self.floor,
                 "bias": float(raw - noise - (self.floor or 0)) if many else None, "rmse": float(np.median(self.values("rmse", name))),
                 "nsd": float(self.nsd(name)) if many else None, "cv": float(np.median(self.values("cv", name))),
-                "cv_pooled": runs.pooled_cv(self.stacks[name], self.reference), "paths_per_cpu_second": float(np.median(self.rounds.column(name, "light_paths") / cpu)),
+                "cv_pooled": runs.pooled_cv(self.stacks[name], self.reference),
+                "paths_per_cpu_second": float(np.median(self.rounds.column(name, "light_paths") / cpu)),
                 "mean": float(self.stacks[name].mean()),
                 "b": {r: float(np.mean([x[name]["b"][r] for x in self.rounds.rounds])) for r in (self.rounds.rounds[0][name]["b"])},
                 "b_spread": float(last.std(ddof=1) / last.mean()) if last is not None and many and last.mean() > 0 else None,
@@ -113,8 +114,8 @@ def table(measured):
     for name in measured.rounds.variants:
         r = measured.row(name)
         share = None if measured.floor is None else measured.floor / r["relmse_as_rendered"]
-        lines.append([name, str(r["iterations"]), cell(r["cpu_seconds"], ".2f"), cell(r["relmse"], ".3g"), cell(r["noise"], ".3g"), cell(r["bias"], ".2g"),
-                      cell(share, ".1%"), cell(r["rmse"], ".3g"), cell(r["nsd"], ".3f"), cell(r["cv"], ".3f"), cell(r["cv_pooled"], ".3f"),
+        lines.append([name, str(r["iterations"]), cell(r["cpu_seconds"], ".2f"), cell(r["relmse"], ".3g"), cell(r["noise"], ".3g"),
+                      cell(r["bias"], ".2g"), cell(share, ".1%"), cell(r["rmse"], ".3g"), cell(r["nsd"], ".3f"), cell(r["cv"], ".3f"), cell(r["cv_pooled"], ".3f"),
                       cell(r["paths_per_cpu_second"] / 1e3, ".0f"), cell(r["b_spread"], ".1%")])
     width = [max(len(line[i]) for line in [HEAD, *lines]) for i in range(len(HEAD))]
     return "\n".join("  ".join(x.rjust(w) if i else x.ljust(w) for i, (x, w) in enumerate(zip(line, width))) for line in [HEAD, *lines])
@@ -219,7 +220,8 @@ def main():
     if a.section:
         entries = list(planned(a))
     elif a.scene and a.reference and a.variants:
-        entries = [{"name": os.path.basename(os.path.dirname(os.path.abspath(a.scene))), "scene": a.scene, "reference": a.reference, "reference_var": a.reference_var,
+        entries = [{"name": os.path.basename(os.path.dirname(os.path.abspath(a.scene))), "scene": a.scene,
+                    "reference": a.reference, "reference_var": a.reference_var,
                     "variants": dict(v.split("=", 1) for v in a.variants), "pairs": a.pair,
                     **{k: v for k, v in (("budget", a.budget), ("iterations", a.iterations)) if v}}]
     else:

@@ -34,8 +34,8 @@ def say(text):
 
 def mitsuba_speed(spp, rounds):
     """Samples a CPU second of scalar_rgb `path` on the Cornell box of mi.cornell_box()."""
-    command = [sys.executable, os.path.join(runs.HERE, "mitsuba_speed.py"), os.path.join(runs.HERE, "cornell-box", "scene.xml"), "--width", "256", "--height", "256",
-               "--spp", str(spp), "--rounds", str(rounds), "--variants", "scalar_rgb"]
+    box = os.path.join(runs.HERE, "cornell-box", "scene.xml")
+    command = [sys.executable, os.path.join(runs.HERE, "mitsuba_speed.py"), box, "--width", "256", "--height", "256", "--spp", str(spp), "--rounds", str(rounds), "--variants", "scalar_rgb"]
     document = json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
     return document["variants"]["scalar_rgb"]["samples_per_cpu_second"]
 
@@ -74,7 +74,8 @@ def measure(name, scene, peers, a, program):
         with open(file, "w") as f:
             json.dump(speeds, f)
     factor = float(np.mean(speeds)) / there
-    print(f"\n{name}: {len(rounds.rounds)} seeds; Mitsuba {', '.join(f'{s / 1e6:.3f}' for s in speeds)} Msamples a CPU second: a second here is {factor:.2f} there")
+    told = ", ".join(f"{s / 1e6:.3f}" for s in speeds)
+    print(f"\n{name}: {len(rounds.rounds)} seeds; Mitsuba {told} Msamples a CPU second: a second here is {factor:.2f} there")
     if max(speeds) > 1.15 * min(speeds):
         print("  note: Mitsuba's speed moved by more than 15 %: measure again on a quieter machine")
     return [row(name, sampler, rounds, factor, seconds, peers) for sampler in variants]
@@ -89,10 +90,11 @@ def row(name, sampler, rounds, factor, seconds, peers):
     theirs = peers["noise"][name].get(sampler)
     interval = paired.jackknife(lambda keep: runs.nsd(stack[keep]) * correction(keep) / theirs, len(stack))
     mark = peers["marks"].get(sampler)
-    found = {"scene": name, "sampler": sampler, "seeds": len(stack), "iterations": rounds.iterations[sampler], "cpu_seconds": float(np.median(cpu / factor)),
-             "scaled_cpu_seconds": float(np.median(cpu)), "factor": factor, "nsd_as_rendered": runs.nsd(stack), "nsd": float(runs.nsd(stack) * correction(everything)),
-             "nsd_of_channels_mean": float(runs.nsd(stack.mean(axis=3, keepdims=True)) * correction(everything)), "theirs": theirs,
-             "ratio": vars(interval) if interval else None, "mark": mark, "verdict": paired.verdict(interval, mark) if mark else "-",
+    found = {"scene": name, "sampler": sampler, "seeds": len(stack), "iterations": rounds.iterations[sampler],
+             "cpu_seconds": float(np.median(cpu / factor)), "scaled_cpu_seconds": float(np.median(cpu)), "factor": factor, "nsd_as_rendered": runs.nsd(stack),
+             "nsd": float(runs.nsd(stack) * correction(everything)),
+             "nsd_of_channels_mean": float(runs.nsd(stack.mean(axis=3, keepdims=True)) * correction(everything)),
+             "theirs": theirs, "ratio": vars(interval) if interval else None, "mark": mark, "verdict": paired.verdict(interval, mark) if mark else "-",
              "paths_per_scaled_cpu_second": float(np.median(rounds.column(sampler, "light_paths") / cpu))}
     print(f"  {sampler:10s} {found['scaled_cpu_seconds']:6.2f} s there ({found['cpu_seconds']:.2f} here, {found['iterations']} iterations), noise {found['nsd']:.4f} "
           f"(mean {found['nsd_of_channels_mean']:.4f}), theirs {theirs}: {paired.show(interval)}, mark {mark or '-'}: {found['verdict']}; "

@@ -47,7 +47,8 @@ def measured(folder, truth, floor, **budget):
     scene = os.path.join(folder, "scene.xml")
     with open(scene, "w") as f:
         f.write("<scene/>")
-    entry = {"name": "made up", "scene": scene, "reference": mean, "variants": {"a": "a", "b": "b"}, "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57"], **budget}
+    entry = {"name": "made up", "scene": scene, "reference": mean, "variants": {"a": "a", "b": "b"},
+             "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57"], **budget}
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         return equal_time.measure(entry, MadeUp(truth), os.path.join(folder, f"runs {floor} {budget}"), 16, 16)
 
@@ -68,7 +69,8 @@ def test():
             pair = d["pairs"][0]
             # With the start-up: a has 198 iterations in two seconds, b 49.5; at 100 iterations 1.02 and 4.02 seconds.
             known = 2 * 49.5 / 198 if "budget" in budget else 2 * 1.02 / 4.02
-            check(f"{budget}: the interval holds the known ratio", pair["interval"]["low"] < known < pair["interval"]["high"], f"{pair['interval']['ratio']:.3f} for {known:.3f}")
+            check(f"{budget}: the interval holds the known ratio", pair["interval"]["low"] < known < pair["interval"]["high"],
+                  f"{pair['interval']['ratio']:.3f} for {known:.3f}")
             check(f"{budget}: met, for relMSE and NSD", pair["verdict"] == "met" and d["pairs"][1]["verdict"] == "met")
             check(f"{budget}: cost of a path", d["pairs"][2]["verdict"] == "met", f"{d['pairs'][2]['interval']['ratio']:.3f}")
             for name, row in d["rows"].items():
@@ -80,7 +82,9 @@ def test():
                 plain = paired.ratio(*([r["relmse"] for r in d["runs"][name]] for name in "ab"))
                 check("without the correction for time the ratio is seen to be wrong", plain.low > 1.5, paired.show(plain))
         d = measured(folder, truth, 0.003, budget=2.0)
-        check("no verdict where the reference's noise is most of the error", d["pairs"][3]["interval"]["high"] < 0.95 and d["pairs"][3]["verdict"] == "undecided (floor)", f"{d['pairs'][3]['interval']['high']:.3f}")
+        pair = d["pairs"][3]
+        check("no verdict where the reference's noise is most of the error", pair["interval"]["high"] < 0.95 and pair["verdict"] == "undecided (floor)",
+              f"{pair['interval']['high']:.3f}")
         d = measured(folder, truth, 0.0008, budget=2.0)
         pair = d["pairs"][4]
         check("a noisy reference draws the ratio to 1 and is found out", pair["verdict"] == "undecided (floor)" and pair["interval"]["low"] > 0.57,
@@ -99,7 +103,8 @@ def test():
         check("cv of errors 0.3 and 0.1", abs(e["cv"] - 0.5) < 1e-5, f"{e['cv']:.6f}")
         check("relMSE and RMSE of them", abs(e["relmse"] - 0.05) < 1e-5 and abs(e["rmse"] - math.sqrt(500)) < 1e-4)
         image[3, 5, 1] = math.nan
-        check("a pixel that is not finite counts nowhere, and is counted", reference.errors(image)["masked"] == 1 and abs(reference.errors(image)["cv"] - 0.5) < 1e-5)
+        e = reference.errors(image)
+        check("a pixel that is not finite counts nowhere, and is counted", e["masked"] == 1 and abs(e["cv"] - 0.5) < 1e-5)
         check("no floor without a variance", reference.floor() is None)
         check("NSD of two images", abs(runs.nsd(np.stack([np.full(SHAPE, 1.0), np.full(SHAPE, 3.0)])) - math.sqrt(0.5)) < 1e-12)
     print(f"{len(failures)} failed" if failures else "all hold")
