@@ -27,10 +27,10 @@ impl StepSize {
         self.d
     }
 
-    /// `1/d + 1`.
+    /// `2^octave/d + 1`: the exponent of a step `octave` octaves finer than `d`.
     #[inline(always)]
-    pub(crate) fn exponent(&self) -> f32 {
-        1.0 / self.d as f32 + 1.0
+    pub(crate) fn exponent(&self, octave: usize) -> f32 {
+        (1u32 << octave) as f32 / self.d as f32 + 1.0
     }
 
     /// Learns from one mutation.
@@ -59,7 +59,7 @@ mod tests {
         let mut late = 0u32;
         const STEPS: u32 = 400_000;
         for i in 0..STEPS {
-            mutate_all(&x, step.exponent(), &mut random, &mut y);
+            mutate_all(&x, step.exponent(0), &mut random, &mut y);
             let accepted = random.chance() < (log(&y) - log(&x)).exp();
             if accepted {
                 std::mem::swap(&mut x, &mut y);

@@ -99,8 +99,8 @@ impl ChainReport {
                 100.0 * USEFUL_EXCHANGE_RATES.end()
             ),
             Warning::Normalisation { rung, relative_error } => format!(
-                "b of {} is known to {:.1} % only (above {:.0} %), and of the rungs above it no better: the brightness of what they add to \
-                 an iteration wavers as much. Trace more --photons an iteration, or with a constant radius (--alpha 1) give --normaliser pooled",
+                "b of {} is known to {:.1} % only (above {:.0} %), and of the rungs above it no better: the brightness of what they add \
+                 wavers as much. Trace more --photons an iteration or more iterations",
                 name(rung),
                 100.0 * relative_error,
                 100.0 * KNOWN_NORMALISATION

@@ -134,7 +134,7 @@ pub struct ChainSettings {
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub combine: Option<CombineName>,
-    /// Proposals a chain thrown away at the start of an iteration; default 1000 in the first and after each update of densities, else 0
+    /// Proposals a chain thrown away where its targets are new: before iterations 0, 1, 2, 4, 8, ...; default 1000
     #[arg(long, value_name = "B")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub burn_in: Option<u64>,
@@ -150,7 +150,7 @@ pub struct ChainSettings {
     #[arg(long, value_name = "P")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub redraw: Option<f64>,
-    /// Where the rungs' normalisations come from; default pass
+    /// Where the rungs' normalisations come from; default pooled
     #[arg(long, value_enum, value_name = "FROM")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normaliser: Option<NormaliserName>,
@@ -229,7 +229,7 @@ impl LadderPlan {
                 StepsName::Measured => Allocation::Measured,
                 StepsName::Fixed => Allocation::Fixed,
             },
-            normaliser: match chains.normaliser.unwrap_or(NormaliserName::Pass) {
+            normaliser: match chains.normaliser.unwrap_or(NormaliserName::Pooled) {
                 NormaliserName::Pass => Normaliser::Pass,
                 NormaliserName::Pooled => Normaliser::Pooled,
             },

@@ -113,15 +113,15 @@ impl Aimer {
     /// Targets at an iteration's measurement points, and whether those of light paths are new ones. `shrink` is the radius schedule's factor on
     /// the first iteration's radii.
     ///
-    /// The targets of light paths change before iterations 1, 2, 4, 8, ... and stay in between: densities are read, and the cells of this iteration's
-    /// points join those seen before. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
+    /// The targets of light paths change before iterations 1, 2, 4, 8, ... and stay in between: densities are read, and the cells of all
+    /// points so far are used. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
     /// found too high and the target made low, while the chains still stand there and bring more than the new target grants; and places that
     /// only the new points see have no states to begin with. Chains that are burnt in again forget both; at doubling intervals it costs little.
     pub fn aim(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> (Vec<Aim>, bool) {
         let new = self.iterations == 0 || self.iterations.is_power_of_two();
         let mut aims = self.aims(points, shrink);
+        self.cells.add(points, &aims);
         if new {
-            self.cells.add(points, &aims);
             if self.read_densities(&aims) {
                 self.fill(&mut aims);
             }

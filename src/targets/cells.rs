@@ -5,7 +5,7 @@
 //! measurement points of a pilot and of some iterations; between updates they stay as they are, and chains keep their laws. A path that
 //! reaches points outside all cells is not lost: rung 0 draws it, and its weight says that no other rung does.
 //!
-//! Cells are cubes with sides of powers of two, two to four times as wide as the points are, a size for every size of points. A point
+//! Cells are cubes with sides of powers of two, of a size for every size of points. A point
 //! lies in the cell of its centre; a cell makes those of its neighbours positive that its points' disks may reach into.
 
 use super::aim::Aim;
@@ -145,10 +145,10 @@ impl Cells {
         }
     }
 
-    /// Adds measurement points with their kernel targets and regions. Cells are at least as wide as two footprints, whatever the
-    /// radius: the points of one pixel must not lie in too many of them.
+    /// Adds measurement points with their kernel targets and regions. Cells are as wide as the larger of radius and footprint, to twice
+    /// that: narrow, because what lies in a cell and is not seen takes paths away, and wide enough that few points a pixel find most cells.
     pub fn add(&mut self, points: &[MeasurementPoint<'_>], aims: &[Aim]) {
-        let exponent = |m: &MeasurementPoint<'_>| (2.0 * m.radius.max(m.footprint)).log2().ceil() as i32;
+        let exponent = |m: &MeasurementPoint<'_>| m.radius.max(m.footprint).log2().ceil() as i32;
         let Some(widest) = points.iter().map(exponent).max() else { return };
         let top = *self.top.get_or_insert(widest);
         let mut parts: Vec<Part> = Vec::with_capacity(points.len());
@@ -193,7 +193,7 @@ impl Cells {
         }
         for (cell, (key, content)) in self.known.iter().enumerate() {
             let inverse = inverse_side(top, key.level);
-            // No further than a neighbour: only a point wider than all that came first could reach beyond.
+            // A radius is no wider than a cell, but for a point wider than all that came first.
             let reach = content.reach.min(inverse.recip());
             let [low, high] = [content.low - reach, content.high + reach].map(|p| Key::of(p, inverse, key.level).cell);
             let (kernel, full) = own(cell, content);
@@ -271,8 +271,7 @@ impl Cells {
 }
 
 impl Content {
-    const EMPTY: Self =
-        Self { points: 0.0, kernel: 0.0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, reach: 0.0, gate: Gate::SHUT };
+    const EMPTY: Self = Self { points: 0.0, kernel: 0.0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, reach: 0.0, gate: Gate::SHUT };
 }
 
 /// Targets of a cell while they are gathered; `count` is infinite for a cell with points of its own.

@@ -92,8 +92,6 @@ fn options_of_samplers_that_contradict_each_other_are_told() {
         (&["--sampler", "uniform", "--combine", "last"], "give --sampler visibility, kernel, image or spatial"),
         (&["--sampler", "spatial", "--rungs", "uniform,target,kernel"], "in the order visibility, kernel, target"),
         (&["--sampler", "spatial", "--rungs", "visibility,target"], "must begin with uniform"),
-        (&["--sampler", "kernel", "--normaliser", "pooled"], "needs --alpha 1"),
-        (&["--sampler", "kernel", "--normaliser", "pooled", "--alpha", "0.99"], "with alpha 0.99 the radius shrinks"),
         (&["--sampler", "kernel", "--acceptance", "1"], "--acceptance must lie in (0, 1)"),
         (&["--sampler", "metropolis"], "[possible values: uniform, visibility, kernel, image, spatial]"),
         (&["--sampler", "spatial", "--rungs", "uniform,full"], "full"),

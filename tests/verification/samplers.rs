@@ -13,7 +13,7 @@ const SEEDS: u64 = 16;
 const ITERATIONS: u64 = 12;
 const SAMPLERS: [&str; 4] = ["visibility", "kernel", "image", "spatial"];
 /// Scenes a family holds.
-const SCENES: usize = 5;
+const SCENES: usize = 7;
 
 /// Independent runs; samplers take seeds of their own, so that camera subpaths are not shared.
 fn images(scene: &isophote::scene::mitsuba::LoadedScene, sampler: &str, number: u64) -> Vec<Vec<Rgb>> {
@@ -71,6 +71,8 @@ macro_rules! own {
 
 own! {
     samplers_on_hall: "hall";
+    samplers_on_villa: "villa";
+    samplers_on_canyon: "canyon";
     samplers_on_pool: "pool";
     samplers_on_balls: "balls";
 }

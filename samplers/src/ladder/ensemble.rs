@@ -6,10 +6,15 @@
 //! of it, so it is dropped \[HACHISUKA11\]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
 //! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
 //!
+//! **Steps of all sizes.** A small step has the chain's size `d`, or one of `d/2, d/4, ... d/64`, all equally likely. One size steered to a wanted
+//! mean acceptance fits the places where the chain is most of the time; where a target has wide parts and narrow ones (light far off, and
+//! near the camera) it is far too large for the narrow ones, and a chain that gets there stands still for hundreds of steps. A mixture of
+//! symmetric kernels is symmetric.
+//!
 //! **Redrawn ends.** Some steps keep the coordinates before a cut and draw the rest afresh: where it is hard to come in and easy to move
 //! about inside, they leave a place at once that small steps linger in. The cut is uniform over the `L(x)` coordinates the path used, and a
 //! path that keeps the first k of them uses more than k, so the way back exists with probability `1/L(y)`; the acceptance is
-//! `min(1, T_c(y) L(x) / (T_c(x) L(y)))`. This is not in \[STF\] or \[HACHISUKA11\].
+//! `min(1, T_c(y) L(x) / (T_c(x) L(y)))`. Neither this nor the sizes are in \[STF\] or \[HACHISUKA11\].
 
 use super::carry::Carried;
 use super::schedule::Schedule;
@@ -20,6 +25,9 @@ use crate::mutation::mutate_all;
 use crate::sampler::{CELLS, Drawn, LightPathSpace};
 use crate::state::{Chain, Life, State};
 use crate::stream::{Key, Purpose, UniformStream};
+
+/// Sizes of small steps, each half of the one before.
+const OCTAVES: usize = 7;
 
 /// What all ensembles of a draw share.
 pub(super) struct Plan<'a> {
@@ -198,7 +206,8 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         match how {
             Proposal::Independent => {}
             Proposal::Small => {
-                mutate_all(&self.states[rung - 1].coordinates, self.steps[rung - 1].0.exponent(), &mut self.random, made);
+                let exponent = self.steps[rung - 1].0.exponent(self.random.below(OCTAVES));
+                mutate_all(&self.states[rung - 1].coordinates, exponent, &mut self.random, made);
             }
             Proposal::End => {
                 let kept = &self.states[rung - 1].coordinates;

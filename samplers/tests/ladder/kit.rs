@@ -78,7 +78,7 @@ pub(crate) fn autocorrelation_time(series: &[Vec<f64>], mean: f64) -> f64 {
 
 /// Test settings: small pools, so that short draws are mostly steps.
 pub(crate) fn settings(seed: u64, rungs: usize) -> LadderSettings {
-    LadderSettings { seed, rungs, start_up: 4096, first_burn_in: 200, ..LadderSettings::default() }
+    LadderSettings { seed, rungs, start_up: 4096, first_burn_in: 200, later_burn_in: 0, ..LadderSettings::default() }
 }
 
 /// Estimates of the integrals of several functions from one draw.

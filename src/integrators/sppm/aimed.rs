@@ -104,8 +104,13 @@ impl Aimed {
 
     /// The ladder's diagnostics and the number of regions.
     pub(super) fn report(&self) -> ChainReport {
-        let report = |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.as_ref().map_or(0, Aimer::region_count) };
-        ChainReport { names: self.rungs.clone(), ladder: self.ladder.report(), regions: self.aimer.as_ref().and_then(|aimer| aimer.regions.as_ref()).map(report) }
+        let report =
+            |regions: &Regions| RegionReport { leaves: regions.leaves(), in_use: self.aimer.as_ref().map_or(0, Aimer::region_count) };
+        ChainReport {
+            names: self.rungs.clone(),
+            ladder: self.ladder.report(),
+            regions: self.aimer.as_ref().and_then(|aimer| aimer.regions.as_ref()).map(report),
+        }
     }
 }
 
