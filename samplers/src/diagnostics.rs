@@ -14,7 +14,10 @@ use serde::{Deserialize, Serialize};
 pub struct LadderReport {
     /// Draws made.
     pub draws: u64,
-    /// Paths traced over all draws, start-up and burn-in counted.
+    /// Iterations left to independent paths because chains were not worth their cost.
+    #[serde(default)]
+    pub rested: u64,
+    /// Paths traced over all draws and rested iterations, start-up and burn-in counted.
     pub traced: u64,
     /// Independent groups of chains.
     pub ensembles: usize,

@@ -31,6 +31,9 @@ use weights::Mixture;
 
 /// Dispersion of chains that the first allocation assumes.
 const FIRST_DISPERSION: f64 = 5.0;
+/// Variance that chains must fall below, relative to independent paths at the same cost of paths alone. Easy scenes are foreseen at 0.85 to 1,
+/// hard ones below 0.7 (docs/methods/samplers.md).
+const WORTHWHILE: f64 = 0.8;
 /// Samples for the allocation per rung and ensemble: 4096 for four rungs and sixteen ensembles.
 const SAMPLES: u64 = 64;
 
@@ -49,6 +52,10 @@ pub struct Ladder {
     dispersions: Vec<Dispersion>,
     /// Shares of the steps in the next draw.
     shares: Vec<f64>,
+    /// Variance with chains over that of independent paths alone at the same cost, as the last allocation foresees it.
+    gain: Option<f64>,
+    /// Iterations left to independent paths.
+    rested: u64,
     exchanges: bool,
     /// The next draw's targets are new to the chains.
     retargeted: bool,
@@ -67,6 +74,8 @@ impl Ladder {
             normalisation: Normalisation::new(rungs),
             dispersions: vec![Dispersion::default(); rungs],
             shares: schedule::fixed_shares(rungs),
+            gain: None,
+            rested: 0,
             exchanges: true,
             retargeted: false,
             summary: Summary::new(rungs),
@@ -85,6 +94,19 @@ impl Ladder {
     /// and chains go on from where they stand: they keep their laws, with no start-up to forget.
     pub fn retargeted(&mut self) {
         self.retargeted = true;
+    }
+
+    /// Whether chains are expected to lower the variance by enough to pay for what a draw with chains costs beside its paths. True until
+    /// [`Allocation::Measured`] has found otherwise in the last draw.
+    pub fn worthwhile(&self) -> bool {
+        self.gain.is_none_or(|gain| gain < WORTHWHILE)
+    }
+
+    /// Takes note of an iteration of `paths` light paths for which the caller used [`Uniform`](crate::Uniform) instead. The decision must not
+    /// depend on these paths; [`Ladder::worthwhile`] is made of earlier ones. Chains go on afterwards from where they stand.
+    pub fn rest(&mut self, paths: u64) {
+        self.rested += 1;
+        self.traced += paths;
     }
 
     /// The settings it was made with.
@@ -180,6 +202,7 @@ impl Ladder {
     fn allocate(&mut self, summary: &summary::DrawSummary) {
         let (problem, costs) = summary.problem(&self.normalisation.assumed, &self.taus(FIRST_DISPERSION));
         if let Some(shares) = problem.solve(&floors(self.strata())) {
+            self.gain = Some(problem.gain(&shares));
             // Half way: what a rung is worth depends on the shares it is measured at.
             let wanted = steps_for(&shares, &costs);
             self.shares.iter_mut().zip(wanted).for_each(|(share, wanted)| *share = 0.5 * (*share + wanted));

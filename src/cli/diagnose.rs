@@ -9,6 +9,7 @@ use super::{Verbosity, output, signals};
 use crate::image::file::{check_writable, replace};
 use crate::image::picture::ImageError;
 use crate::integrators::chains::ChainReport;
+use crate::integrators::photon_settings::RestName;
 use crate::integrators::sppm::SppmSettings;
 use crate::integrators::{BoxedSettings, Integrator};
 use crate::render::{Budget, Diagnosis, Interrupt, SceneRecord, diagnose};
@@ -83,7 +84,10 @@ fn diagnose_scene(arguments: &DiagnoseArgs, verbosity: Verbosity) -> Outcome {
     let size = loaded.scene.camera().resolution();
     let changes = shared.changes();
     let common = changes.common(arguments.seed, &loaded.defaults);
-    let settings: &dyn BoxedSettings = &arguments.settings;
+    // Chains that rest tell nothing.
+    let mut settings = arguments.settings.clone();
+    settings.photons.chains.rest.get_or_insert(RestName::Never);
+    let settings: &dyn BoxedSettings = &settings;
     let mut method: Box<dyn Integrator + '_> = settings.build(&loaded.scene, size, &common)?;
     let budget = Budget::new(shared.iterations, shared.time, ITERATIONS);
     running.store(true, Ordering::SeqCst);

@@ -66,6 +66,16 @@ pub enum StepsName {
     Fixed,
 }
 
+/// What becomes of chains in scenes that do not need them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RestName {
+    /// Iterations are left to independent light paths where chains are not expected to be worth their cost; needs --steps measured
+    Easy,
+    /// Chains draw in every iteration
+    Never,
+}
+
 /// Where a target reads photon densities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -134,7 +144,7 @@ pub struct ChainSettings {
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub combine: Option<CombineName>,
-    /// Proposals a chain thrown away where its targets are new: before iterations 0, 1, 2, 4, 8, ...; default 1000
+    /// Proposals a chain thrown away where its targets are new: before iterations 0, 1, 2, 4, 8, ...; default 1000 before 0, 250 later
     #[arg(long, value_name = "B")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub burn_in: Option<u64>,
@@ -158,6 +168,10 @@ pub struct ChainSettings {
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub steps: Option<StepsName>,
+    /// When chains rest; default easy with --steps measured, else never
+    #[arg(long, value_enum, value_name = "WHEN")]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rest: Option<RestName>,
     /// Where an image or spatial target reads densities; default blend
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -174,6 +188,12 @@ pub struct ChainSettings {
     #[arg(long, value_name = "N")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blend_paths: Option<f64>,
+}
+
+impl ChainSettings {
+    fn measured(&self) -> bool {
+        self.steps != Some(StepsName::Fixed)
+    }
 }
 
 impl Default for PhotonSettings {
@@ -205,6 +225,8 @@ pub struct LadderPlan {
     pub rungs: Vec<Rung>,
     /// Over what its full target keeps densities.
     pub regions: RegionKind,
+    /// Leaves easy scenes to independent paths.
+    pub rest: bool,
 }
 
 impl LadderPlan {
@@ -225,10 +247,7 @@ impl LadderPlan {
                 CombineName::Average => Combine::Average,
                 CombineName::Last => Combine::Last,
             },
-            allocation: match chains.steps.unwrap_or(StepsName::Measured) {
-                StepsName::Measured => Allocation::Measured,
-                StepsName::Fixed => Allocation::Fixed,
-            },
+            allocation: if chains.measured() { Allocation::Measured } else { Allocation::Fixed },
             normaliser: match chains.normaliser.unwrap_or(NormaliserName::Pooled) {
                 NormaliserName::Pass => Normaliser::Pass,
                 NormaliserName::Pooled => Normaliser::Pooled,
@@ -249,7 +268,8 @@ impl PhotonSettings {
             SamplerName::Image => (vec![Uniform, Visibility, Kernel, Target], RegionKind::Image),
             SamplerName::Spatial => (vec![Uniform, Visibility, Kernel, Target], RegionKind::Space),
         };
-        Some(LadderPlan { rungs: self.chains.rungs.clone().unwrap_or(rungs), regions })
+        let rest = self.chains.measured() && self.chains.rest != Some(RestName::Never);
+        Some(LadderPlan { rungs: self.chains.rungs.clone().unwrap_or(rungs), regions, rest })
     }
 
     /// Light paths an iteration over a film of this size.
@@ -301,7 +321,7 @@ impl PhotonSettings {
         let chains = &self.chains;
         if self.sampler == SamplerName::Uniform && *chains != ChainSettings::default() {
             return Err(
-                "rungs, combine, burn-in, ensembles, acceptance, redraw, normaliser, steps and the options of densities belong to Metropolis \
+                "rungs, combine, burn-in, ensembles, acceptance, redraw, normaliser, steps, rest and the options of densities belong to Metropolis \
                         samplers: give --sampler visibility, kernel, image or spatial"
                     .into(),
             );
@@ -326,6 +346,9 @@ impl PhotonSettings {
         }
         if chains.ensembles.is_some_and(|n| !(2..=4096).contains(&n)) {
             return Err("--ensembles must lie in 2..4096".into());
+        }
+        if chains.rest == Some(RestName::Easy) && !chains.measured() {
+            return Err("--rest easy needs --steps measured, which tells what chains are worth".into());
         }
         Ok(())
     }

@@ -122,7 +122,8 @@ impl Integrator for Sppm<'_> {
         let mut stats = IterationStats::default();
         match self.aimed.take() {
             Some(mut aimed) => {
-                aimed.prepare(self, &mut stats);
+                // Without any measurement point the grid is never asked.
+                self.cell = 2.0 * aimed.prepare(self, &mut stats).unwrap_or(1.0);
                 self.aimed = Some(aimed);
             }
             // The grid's cells are as wide as a typical query, so that one touches about two runs a row.
@@ -141,7 +142,8 @@ impl Integrator for Sppm<'_> {
         let mut stats = IterationStats { camera_paths: self.eye.pixels() as u64, ..IterationStats::default() };
         let glossy = match self.aimed.take() {
             Some(mut aimed) => {
-                let glossy = aimed.iterate(self, i, film, &mut stats);
+                let rests = aimed.rests(self.photon_count);
+                let glossy = if rests { self.iterate_uniform(i, film, &mut stats) } else { aimed.iterate(self, i, film, &mut stats) };
                 self.aimed = Some(aimed);
                 glossy
             }

@@ -110,17 +110,29 @@ impl Aimer {
         &self.cells
     }
 
+    /// Whether this iteration, the first or one in two that may change the targets, is one in which chains should draw even if they were not
+    /// worth it before: what is known of densities grows by it.
+    pub fn trial(&self) -> bool {
+        self.iterations == 0 || (self.iterations.is_power_of_two() && self.iterations.trailing_zeros().is_multiple_of(2))
+    }
+
+    /// An iteration goes by without targets.
+    pub fn skip(&mut self) {
+        self.iterations += 1;
+    }
+
     /// Targets at an iteration's measurement points, and whether those of light paths are new ones. `shrink` is the radius schedule's factor on
     /// the first iteration's radii.
     ///
-    /// The targets of light paths change before iterations 1, 2, 4, 8, ... and stay in between: densities are read, and the cells of all
+    /// The targets of light paths change before iterations 1, 2, 4, 8, ... (without regions only while new cells come) and stay in between: densities
+    /// are read, and the cells of all
     /// points so far are used. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
     /// found too high and the target made low, while the chains still stand there and bring more than the new target grants; and places that
     /// only the new points see have no states to begin with. Chains that are burnt in again forget both; at doubling intervals it costs little.
     pub fn aim(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> (Vec<Aim>, bool) {
-        let new = self.iterations == 0 || self.iterations.is_power_of_two();
         let mut aims = self.aims(points, shrink);
         self.cells.add(points, &aims);
+        let new = self.iterations == 0 || (self.iterations.is_power_of_two() && (self.regions.is_some() || self.cells.grown()));
         if new {
             if self.read_densities(&aims) {
                 self.fill(&mut aims);

@@ -104,6 +104,8 @@ pub struct Cells {
     top: Option<i32>,
     known: Table<Content>,
     parts: Vec<Part>,
+    /// Cells with points when targets were last made.
+    made_of: usize,
     /// Sides' reciprocals, widest first.
     inverse_sides: Vec<f32>,
     /// Levels present in each bucket of the widest cells.
@@ -139,6 +141,7 @@ impl Cells {
             top: None,
             known: Table::default(),
             parts: Vec::new(),
+            made_of: 0,
             inverse_sides: Vec::new(),
             present: vec![0],
             worths: Table::default(),
@@ -172,10 +175,16 @@ impl Cells {
         });
     }
 
+    /// Whether the points seen since targets were last made lie in new cells, more than one in a hundred.
+    pub fn grown(&self) -> bool {
+        100 * self.known.len() > 101 * self.made_of
+    }
+
     /// Makes the targets: a cell is worth the mean of its points' targets, and a cell without points that a neighbour's disks may reach the mean
     /// over these neighbours. `inverse_density` is the factor of the full target in a region.
     pub fn set(&mut self, inverse_density: impl Fn(u32) -> f64) {
         let Some(top) = self.top else { return };
+        self.made_of = self.known.len();
         let mut densities = vec![0.0; self.known.len()];
         for part in &self.parts {
             densities[part.cell as usize] += f64::from(part.points) * inverse_density(part.leaf);

@@ -18,13 +18,16 @@ const SCENES: usize = 7;
 /// Independent runs; samplers take seeds of their own, so that camera subpaths are not shared.
 fn images(scene: &isophote::scene::mitsuba::LoadedScene, sampler: &str, number: u64) -> Vec<Vec<Rgb>> {
     let settings = format!("{{\"sampler\": \"{sampler}\", \"alpha\": 1.0, \"photons\": 100000}}");
+    // Chains that rest would test nothing.
+    let settings = if sampler == "uniform" { settings } else { settings.replace('}', ", \"rest\": \"never\"}") };
     let base = common(0, scene.defaults.max_depth);
     let run = |seed| render(scene, "sppm", &settings, &Common { seed: 100 * number + seed, ..base.clone() }, ITERATIONS).0;
     (1..=SEEDS).into_par_iter().map(run).collect()
 }
 
-/// Run-level Welch tests of every sampler against the uniform one, the image and tiles of 256 pixels, three channels.
-fn samplers_agree(file: PathBuf, size: (u32, u32)) {
+/// Run-level Welch tests of every sampler against `base`, the image and tiles of 256 pixels, three channels. Where `base` is not the uniform
+/// sampler the image is held against that one too.
+fn samplers_agree(file: PathBuf, size: (u32, u32), base: &str) {
     let scene = load_file(&file, Some(size));
     let (width, height) = (size.0 as usize, size.1 as usize);
     let kept = vec![true; width * height];
@@ -32,15 +35,19 @@ fn samplers_agree(file: PathBuf, size: (u32, u32)) {
     places.extend(tiles(width, height, 16, &kept).into_iter().map(|((x, y), p)| (format!("tile ({x}, {y})"), p)));
     let threshold = sidak(0.01, places.len() * 3 * SAMPLERS.len() * SCENES);
     let uniform = images(&scene, "uniform", 0);
+    let bases = if base == "uniform" { vec![(base, uniform)] } else { vec![(base, images(&scene, base, 99)), ("uniform", uniform)] };
     let mut failures = Vec::new();
     for (number, sampler) in (1..).zip(SAMPLERS) {
         let runs = images(&scene, sampler, number);
-        for (place, pixels) in &places {
+        let compared = |(k, (place, _)): (usize, &(String, Vec<usize>))| k == 0 || place == "image";
+        for (k, (place, pixels)) in (0..bases.len()).flat_map(|k| places.iter().map(move |place| (k, place))).filter(|&pair| compared(pair))
+        {
+            let (base, reference) = &bases[k];
             for channel in 0..3 {
-                let [a, b] = [&uniform, &runs].map(|runs| Sample::of(&run_means(runs, pixels, channel)));
+                let [a, b] = [reference, &runs].map(|runs| Sample::of(&run_means(runs, pixels, channel)));
                 let p = welch(&a, &b);
                 let line = format!(
-                    "{sampler}, {place}, channel {channel}: {:.5} +- {:.5}, uniform {:.5} +- {:.5}, p {p:.1e}",
+                    "{sampler}, {place}, channel {channel}: {:.5} +- {:.5}, {base} {:.5} +- {:.5}, p {p:.1e}",
                     b.mean,
                     b.variance.sqrt(),
                     a.mean,
@@ -60,21 +67,22 @@ fn samplers_agree(file: PathBuf, size: (u32, u32)) {
 }
 
 macro_rules! own {
-    ($($test:ident: $scene:literal;)*) => {$(
+    ($($test:ident: $scene:literal, $base:literal;)*) => {$(
         #[test]
         #[ignore = "minutes; run by .ci/run"]
         fn $test() {
-            samplers_agree(root().join("scenes").join($scene).join("scene.xml"), (96, 72));
+            samplers_agree(root().join("scenes").join($scene).join("scene.xml"), (96, 72), $base);
         }
     )*};
 }
 
 own! {
-    samplers_on_hall: "hall";
-    samplers_on_villa: "villa";
-    samplers_on_canyon: "canyon";
-    samplers_on_pool: "pool";
-    samplers_on_balls: "balls";
+    samplers_on_hall: "hall", "uniform";
+    samplers_on_villa: "villa", "uniform";
+    // Of independent paths one in ten thousand lights the near half of the picture: whole tiles stay black.
+    samplers_on_canyon: "canyon", "kernel";
+    samplers_on_pool: "pool", "uniform";
+    samplers_on_balls: "balls", "uniform";
 }
 
 macro_rules! foreign {
@@ -83,7 +91,7 @@ macro_rules! foreign {
         #[ignore = "minutes; run by .ci/run"]
         fn $test() {
             let Some(shared) = shared() else { return };
-            samplers_agree(shared.join("scenes").join($scene).join("scene.xml"), (96, 96));
+            samplers_agree(shared.join("scenes").join($scene).join("scene.xml"), (96, 96), "uniform");
         }
     )*};
 }

@@ -148,7 +148,7 @@ mod tests {
         // Few paths are visible, which is the scene's doing.
         rungs[0].exchange_rate = Some(0.01);
         rungs[3].exchange_rate = None;
-        LadderReport { draws: 3, traced: 5000, ensembles: 16, round_trips: 7, rungs }
+        LadderReport { draws: 3, rested: 0, traced: 5000, ensembles: 16, round_trips: 7, rungs }
     }
 
     fn after(change: impl FnOnce(&mut LadderReport)) -> Vec<Warning> {

@@ -73,7 +73,7 @@ impl Default for LadderSettings {
             rungs: 4,
             ensembles: 16,
             first_burn_in: 1000,
-            later_burn_in: 1000,
+            later_burn_in: 250,
             acceptance: 0.234,
             redraw: 0.15,
             combine: Combine::Mis,

@@ -164,6 +164,7 @@ impl Summary {
     pub(super) fn report(&self, ladder: &Ladder) -> LadderReport {
         LadderReport {
             draws: ladder.draws,
+            rested: ladder.rested,
             traced: ladder.traced,
             ensembles: ladder.chains.len(),
             round_trips: self.round_trips,

@@ -34,6 +34,9 @@ pub(in crate::cli) fn numbers(chains: &ChainReport) -> String {
         ("round trips".to_owned(), ladder.round_trips.to_string()),
         ("dead states".to_owned(), dead.to_string()),
     ];
+    if ladder.rested > 0 {
+        counts.insert(1, ("left to uniform".to_owned(), ladder.rested.to_string()));
+    }
     if let Some(regions) = chains.regions {
         counts.push(("regions in use".to_owned(), format!("{} of {}", regions.in_use, regions.leaves)));
     }

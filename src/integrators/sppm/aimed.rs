@@ -28,26 +28,37 @@ pub(super) struct Aimed {
     aimer: Option<Aimer>,
     rungs: Vec<Rung>,
     regions: RegionKind,
+    /// Leaves iterations to independent paths where chains are not worth their cost.
+    rest: bool,
 }
 
 impl Aimed {
     pub(super) fn new(settings: &PhotonSettings, plan: &LadderPlan, seed: u64) -> Self {
-        Self { ladder: Ladder::new(plan.settings(settings, seed)), aimer: None, rungs: plan.rungs.clone(), regions: plan.regions }
+        Self {
+            ladder: Ladder::new(plan.settings(settings, seed)),
+            aimer: None,
+            rungs: plan.rungs.clone(),
+            regions: plan.regions,
+            rest: plan.rest,
+        }
     }
 
-    /// Looks where the camera measures, and builds the tree of regions.
-    pub(super) fn prepare(&mut self, sppm: &Sppm<'_>, stats: &mut IterationStats) {
-        self.aimer = Some(self.aimer(sppm, stats));
-    }
-
-    fn aimer(&self, sppm: &Sppm<'_>, stats: &mut IterationStats) -> Aimer {
+    /// Looks where the camera measures, and builds the tree of regions. Returns the median radius; `None` without a measurement point.
+    pub(super) fn prepare(&mut self, sppm: &Sppm<'_>, stats: &mut IterationStats) -> Option<f32> {
         let pilot = pilot(&sppm.eye, sppm.radius_at(0), stats);
+        self.aimer = Some(self.aimer(sppm, &pilot));
+        let mut radii: Vec<f32> = pilot.iter().map(|m| m.radius).collect();
+        let middle = radii.len() / 2;
+        (!radii.is_empty()).then(|| *radii.select_nth_unstable_by(middle, f32::total_cmp).1)
+    }
+
+    fn aimer(&self, sppm: &Sppm<'_>, pilot: &[MeasurementPoint<'_>]) -> Aimer {
         let regions = match self.regions {
             RegionKind::None => None,
             RegionKind::Image => Some(Regions::image(sppm.eye.size.0, sppm.eye.size.1)),
             RegionKind::Space => Some(Regions::spatial(pilot.iter().map(|m| m.point.end.p).collect())),
         };
-        Aimer::new(regions, self.place(&sppm.eye), sppm.settings.refinement(), sppm.eye.depths(), &pilot)
+        Aimer::new(regions, self.place(&sppm.eye), sppm.settings.refinement(), sppm.eye.depths(), pilot)
     }
 
     fn place(&self, eye: &Eye<'_>) -> Place {
@@ -57,12 +68,22 @@ impl Aimed {
         }
     }
 
+    /// Whether an iteration of `paths` light paths is better left to independent ones; takes note of it if so.
+    pub(super) fn rests(&mut self, paths: u64) -> bool {
+        let Some(aimer) = self.aimer.as_mut().filter(|aimer| self.rest && !self.ladder.worthwhile() && !aimer.trial()) else {
+            return false;
+        };
+        aimer.skip();
+        self.ladder.rest(paths);
+        true
+    }
+
     /// An iteration: camera subpaths first, then light paths aimed at what they found.
     pub(super) fn iterate(&mut self, sppm: &Sppm<'_>, i: u64, film: &mut Film, stats: &mut IterationStats) -> Glossy {
         let (mut values, mut points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
-        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, stats));
+        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, points.all()));
         let (aims, new) = aimer.aim(points.all(), shrink(i, sppm.settings.alpha));
         if new {
             self.ladder.retargeted();
@@ -156,4 +177,80 @@ fn pilot<'a>(eye: &Eye<'a>, radius: Radius, stats: &mut IterationStats) -> Vec<M
         stats.count(&tally);
     }
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrators::Common;
+    use crate::samplers::{Key, LightPathSpace, Purpose};
+    use crate::scene::Scene;
+    use crate::scene::mitsuba::{LoadOptions, load};
+    use crate::targets::cells::CellSearch;
+    use crate::targets::points::{Search, Touch};
+    use std::path::Path;
+
+    const SIZE: (usize, usize) = (48, 36);
+
+    fn sppm(scene: &Scene, max_depth: u32) -> Sppm<'_> {
+        let common = Common { seed: 0, max_depth: Some(max_depth), min_depth: 1, rr_depth: 5, hide_emitters: false, paths: None };
+        let eye = Eye { scene, common, size: SIZE, threshold: 0.05 };
+        Sppm { eye, settings: PhotonSettings::default(), photon_count: 1, cell: 1.0, aimed: None, glossy: Glossy::default() }
+    }
+
+    /// Light paths of a scene, with the number of points that they add light to, and of vertices that cells admit.
+    fn paths(sppm: &Sppm<'_>, aimer: &Aimer, points: &Points<'_>) -> Vec<(usize, u32)> {
+        let (mut path, mut touches) = (crate::targets::LightPath::default(), Vec::new());
+        let of_path = |index| {
+            let mut stream = Key { seed: 5, iteration: 0, index, purpose: Purpose::Test }.stream();
+            sppm.light_paths().trace(&mut stream, &mut path);
+            points.touched(&path.vertices, &mut Search::default(), &mut touches);
+            let reached = aimer.cells().reached(&path.vertices, &mut CellSearch::default());
+            assert_eq!(reached.vertices > 0, reached.kernel > 0.0 && reached.full > 0.0);
+            // Light on the back of what lets none through touches a point and adds nothing.
+            let adds = |touch: &&Touch| !points.value(touch.point, &path.vertices[touch.vertex as usize]).is_black();
+            (touches.iter().filter(adds).count(), reached.vertices)
+        };
+        (0..20_000).map(of_path).collect()
+    }
+
+    /// Targets are positive wherever a point that made them takes a light vertex, whatever its material, its side and its depth, and hardly
+    /// anywhere else: surfaces that the camera never sees are left out, the backs of those it sees among them.
+    #[test]
+    fn targets_cover_the_points_that_made_them() {
+        for (name, max_depth, least, most) in [("textured-room", 6, 0.2, 0.98), ("glass-box", 3, 0.2, 0.98), ("villa", 8, 0.0005, 0.02)] {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).join("scene.xml");
+            let options = LoadOptions { resolution: Some((SIZE.0 as u32, SIZE.1 as u32)), ..Default::default() };
+            let loaded = load(&file, &options).unwrap();
+            let sppm = sppm(&loaded.scene, max_depth);
+            let (_, points, _) = look(&sppm, sppm.radius_at(0), 0, &mut IterationStats::default());
+            let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &[]);
+            assert!(aimer.trial() && aimer.aim(points.all(), 1.0).1);
+            let paths = paths(&sppm, &aimer, &points);
+            let missed = paths.iter().filter(|(touches, reached)| *touches > 0 && *reached == 0).count();
+            let touching = paths.iter().filter(|(touches, _)| *touches > 0).count();
+            assert!(touching > 10 && 500 * missed <= touching, "{name}: {missed} of {touching} paths that count are not aimed at");
+            let aimed = paths.iter().filter(|(_, reached)| *reached > 0).count() as f64 / paths.len() as f64;
+            assert!((least..most).contains(&aimed), "{name}: {aimed} of all paths are aimed at");
+        }
+    }
+
+    /// A second look finds most of what a pilot of some paths a pixel has seen.
+    #[test]
+    fn a_pilot_finds_what_later_iterations_see() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/canyon/scene.xml");
+        let options = LoadOptions { resolution: Some((SIZE.0 as u32, SIZE.1 as u32)), ..Default::default() };
+        let loaded = load(&file, &options).unwrap();
+        let sppm = sppm(&loaded.scene, 8);
+        let mut stats = IterationStats::default();
+        let pilot = pilot(&sppm.eye, sppm.radius_at(0), &mut stats);
+        let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &pilot);
+        let (_, points, _) = look(&sppm, sppm.radius_at(0), 0, &mut stats);
+        aimer.aim(points.all(), 1.0);
+        let (_, points, _) = look(&sppm, sppm.radius_at(1), 1, &mut stats);
+        let paths = paths(&sppm, &aimer, &points);
+        let missed = paths.iter().filter(|(touches, reached)| *touches > 0 && *reached == 0).count();
+        let touching = paths.iter().filter(|(touches, _)| *touches > 0).count();
+        assert!(touching > 500 && missed * 20 < touching, "{missed} of {touching} are missed");
+    }
 }
