@@ -112,16 +112,20 @@ fn without_a_chain_there_is_nothing_to_diagnose() {
 #[test]
 fn threads_change_no_bit_of_a_sampler() {
     let bench = Bench::new();
-    for (sampler, names) in CHAINS {
+    // Chains that may rest, and chains that must not.
+    for ((sampler, names), rest) in CHAINS.into_iter().flat_map(|chain| [(chain, "easy"), (chain, "never")]) {
         let on = |threads: &str| {
             let fixed = ["render", "sppm", "lamp/scene.xml", "--sampler", sampler, "--photons", "20000", "--iterations", "3"];
-            bench.succeed(&[&fixed[..], &["-o", "a.exr", "-q", "--threads", threads]].concat());
+            bench.succeed(&[&fixed[..], &["--rest", rest, "-o", "a.exr", "-q", "--threads", threads]].concat());
             essence(&bench.read("a.exr"))
         };
         let (one, two) = (on("1"), on("2"));
         assert!(one == two, "{sampler}: 1 and 2 threads differ");
         let told = &one.1["diagnostics"]["sampler"];
-        assert_eq!((rungs(told).len(), &told["draws"]), (names.len(), &json!(3)), "{sampler}");
+        let [draws, rested] = ["draws", "rested"].map(|key| told[key].as_u64().unwrap());
+        assert_eq!((rungs(told).len(), draws + rested), (names.len(), 3), "{sampler}");
+        // Most of this scene's light reaches the picture: the third iteration needs no chains.
+        assert_eq!(rested, u64::from(rest == "easy"), "{sampler}, --rest {rest}");
         assert!(!told.to_string().contains("\"traces\""));
         assert!(one.0.iter().any(|(_, bits)| bits.iter().any(|b| *b != 0)), "{sampler} renders black");
     }

@@ -92,6 +92,7 @@ fn options_of_samplers_that_contradict_each_other_are_told() {
         (&["--sampler", "uniform", "--combine", "last"], "give --sampler visibility, kernel, image or spatial"),
         (&["--sampler", "spatial", "--rungs", "uniform,target,kernel"], "in the order visibility, kernel, target"),
         (&["--sampler", "spatial", "--rungs", "visibility,target"], "must begin with uniform"),
+        (&["--sampler", "kernel", "--steps", "fixed", "--rest", "easy"], "--rest easy needs --steps measured"),
         (&["--sampler", "kernel", "--acceptance", "1"], "--acceptance must lie in (0, 1)"),
         (&["--sampler", "metropolis"], "[possible values: uniform, visibility, kernel, image, spatial]"),
         (&["--sampler", "spatial", "--rungs", "uniform,full"], "full"),
