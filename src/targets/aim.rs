@@ -27,6 +27,9 @@ pub enum Rung {
 /// `epsilon` of the compressed inverse kernel size and inverse density [STF (11)].
 const EPSILON: f64 = 1e-4;
 
+/// First iterations whose points are all looked at for new cells; later ones only where targets change.
+const LOOKS: u64 = 16;
+
 /// Values of the targets at one measurement point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
@@ -125,14 +128,17 @@ impl Aimer {
     /// the first iteration's radii.
     ///
     /// The targets of light paths change before iterations 1, 2, 4, 8, ... (without regions only while new cells come) and stay in between: densities
-    /// are read, and the cells of all
+    /// are read, and the cells of
     /// points so far are used. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
     /// found too high and the target made low, while the chains still stand there and bring more than the new target grants; and places that
     /// only the new points see have no states to begin with. Chains that are burnt in again forget both; at doubling intervals it costs little.
     pub fn aim(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> (Vec<Aim>, bool) {
         let mut aims = self.aims(points, shrink);
-        self.cells.add(points, &aims);
-        let new = self.iterations == 0 || (self.iterations.is_power_of_two() && (self.regions.is_some() || self.cells.grown()));
+        let due = self.iterations == 0 || self.iterations.is_power_of_two();
+        if due || self.iterations < LOOKS {
+            self.cells.add(points, &aims);
+        }
+        let new = self.iterations == 0 || (due && (self.regions.is_some() || self.cells.grown()));
         if new {
             if self.read_densities(&aims) {
                 self.fill(&mut aims);

@@ -116,9 +116,9 @@ pub struct Cells {
 /// What the cells around a path's vertices are worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reached {
-    /// Largest kernel and full target; 0 where no vertex counts.
+    /// Largest kernel target; 0 where no vertex counts.
     pub kernel: f32,
-    /// The same of the full target.
+    /// Largest full target; 0 where no vertex counts.
     pub full: f32,
     /// Vertices that count.
     pub vertices: u32,
@@ -134,7 +134,7 @@ pub struct CellSearch {
 }
 
 impl Cells {
-    /// None.
+    /// No cells. `depths` are the path lengths that count, in edges from light to camera.
     pub fn new(depths: DepthRange) -> Self {
         Self {
             depths,

@@ -1,12 +1,12 @@
 //! States that a draw leaves to the next one, whose targets may be others.
 //!
 //! At the end of a draw a chain of rung c stands at a state of the law `T_c/b_c`; the next draw wants `T'_c/b'_c`. Going on from the state as if
-//! nothing had happened is biased until the chain has forgotten it, and with measurement points that move it is so in every draw: states that
-//! survive the move stand where points are dense, and those that do not are replaced by what is near. So a draw keeps a sample of the states
-//! it counted, with their targets. The next one evaluates its own targets at all of them and resamples every chain's start with probability
+//! nothing had happened is biased until the chain has forgotten it. So a draw keeps a sample of the states it counted, with their targets. If
+//! its targets are new ([`Ladder::retargeted`](crate::Ladder::retargeted)) the next one evaluates its own targets at all of them and resamples every chain's start with probability
 //! proportional to `T'_c/T_c`: sampling importance resampling, the step of sequential Monte Carlo from one target to the next. What remains
 //! is an error of the order of one over the number of states kept, and what the old target does not cover: states that only the new one sees are
-//! not among those kept, so that a place that loses and gains states at every draw begins each with too few (docs/methods/samplers.md, known bias).
+//! not among those kept. With a support that moves in every draw this is a bias that more draws do not mend (docs/methods/samplers.md, bias of
+//! moving targets); targets should change seldom, and their supports only grow.
 
 use super::start::evenly;
 use crate::mutation::Coordinates;
