@@ -1,0 +1,35 @@
+//! Weights of vertex connection and merging without the full path at hand: what a subpath carries from vertex to vertex, and the weight
+//! of every technique from what two ends carry. [`densities`](super::densities) defines what comes out; the two are held together by test.
+//!
+//! A walk keeps one [`Carried`] a vertex: [`Weights::from_light`] or [`Weights::from_camera`] makes that of the first vertex met,
+//! [`Weights::extend`] every next one. Where two subpaths meet, [`Weights::connection`], [`Weights::next_event`],
+//! [`Weights::emitter_hit`], [`Weights::splat`] and [`Weights::merge`] say what the technique at hand weighs against all others.
+//!
+//! The recursion is that of [VCM-TR] and [THESIS (2.50), (2.51)], with connections and merges carried apart. So every vertex may have its
+//! own factor on merges ([VCM* (6)]), and a factor that only the full path knows ([VCM* (7)]) is multiplied on at the join:
+//!
+//! ```text
+//! last_i        = n_i / p(x_i)
+//! connections_i = (back / (fwd ahead)) [last_{i-1}    + rev connections_{i-1}]
+//! merges_i      = (back / (fwd ahead)) [share_{i-1}   + rev merges_{i-1}]
+//! at the join:    found [last_i + rev connections_i + g (share_i + rev merges_i)],     g = pi r^2 N m / S
+//! ```
+//!
+//! `n_i` is the number of samples of the connection across the edge that led to `x_i`; `fwd` and `rev` are densities per steradian at
+//! `x_{i-1}` of going on and of going back; `ahead` and `back` the edge's factors from steradians to area at its two ends; `share` is 1,
+//! or one over the photons a merge finds; `m / S` is one over the mean share of the path where the heuristic asks for it, else 1. With an
+//! exponent, every factor and every term is raised to it, but `S` and `m` are sums of plain shares.
+//!
+//! **Range.** Ratios are carried, not densities, and no power leaves f32 in rooms of common size; scenes of kilometres at a radius of
+//! micrometres should take f64 with exponents above 1. An overflow of one side makes the weight 0, which it nearly was.
+
+mod carried;
+mod heuristic;
+mod weights;
+
+pub use carried::{Carried, Edge, Emission, Scatter};
+pub use heuristic::{Heuristic, HeuristicError, MergeWeights, Sampling, Techniques};
+pub use weights::{Connector, Weights};
+
+#[cfg(test)]
+mod tests;
