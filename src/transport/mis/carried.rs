@@ -5,9 +5,9 @@ use num_traits::Float;
 /// What a vertex of a subpath knows of the techniques that would have split the path before it. Made by [`Weights`](super::Weights).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Carried<R> {
-    /// Samples of the connection across the edge that led here over the density of this vertex: `dVCM` of [VCM-TR].
+    /// Samples of the connection across the edge that led here over the density of this vertex: `dVCM` of \[VCM-TR\].
     pub last: R,
-    /// Earlier connections, up to the density of going back: `dVC` of [VCM-TR] without merges.
+    /// Earlier connections, up to the density of going back: `dVC` of \[VCM-TR\] without merges.
     pub connections: R,
     /// Earlier merges, by share.
     pub merges: R,
@@ -92,7 +92,7 @@ impl<R: Float> Scatter<R> {
     /// `eta`, the index of refraction on the side gone to over that on the side come from.
     ///
     /// A bundle of directions that crosses changes its solid angle: `eta^2 cos_sampled d omega_sampled = cos_given d omega_given`. The
-    /// deltas of the two directions of travel are thus worth different amounts; in [VCM-TR] they count as equal, which keeps the
+    /// deltas of the two directions of travel are thus worth different amounts; in \[VCM-TR\] they count as equal, which keeps the
     /// weights' sum but is not the balance heuristic behind glass.
     #[inline(always)]
     pub fn refraction(fwd: R, rev: R, cos_given: R, cos_sampled: R, eta: R) -> Self {

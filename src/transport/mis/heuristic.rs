@@ -3,8 +3,8 @@
 /// The techniques of one engine. Every path of length 1, a light seen directly, is left to the emitter hit in every set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Techniques {
-    /// Emitter hits, next event and connections between interior vertices. Without them an emitter hit still counts where nothing else can
-    /// make the path: no vertex may merge, and no splat of the set exists.
+    /// Emitter hits, next event and connections between interior vertices. Without them an emitter hit still counts where nothing else
+    /// can make the path: no splat of the set, and no vertex that may merge, whether or not the set has merges.
     pub connections: bool,
     /// Light tracing: connections of a light vertex to the camera.
     pub light_tracing: bool,
@@ -26,7 +26,7 @@ impl Techniques {
 /// What a merge's density is multiplied by before it competes: the number of samples it is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MergeWeights {
-    /// The number of light paths, exponent 1: the balance heuristic ([VEACH (9.8)], [VCM-TR]).
+    /// The number of light paths, exponent 1: the balance heuristic ([VEACH (9.8)], \[VCM-TR\]).
     #[default]
     Balance,
     /// The number of light paths, any exponent: the power heuristic ([VEACH 9.2], [THESIS (2.11)]).
@@ -113,9 +113,9 @@ pub struct Sampling {
     pub techniques: Techniques,
     /// How they are weighed.
     pub heuristic: Heuristic,
-    /// Light subpaths in the iteration: each camera subpath connects to one of them, merges with all, and all of them splat.
+    /// Light subpaths in the iteration, at least 1: each camera subpath connects to one of them, merges with all, and all of them splat.
     pub light_paths: f64,
-    /// Radius of a merge, world units.
+    /// Radius of a merge, world units, positive.
     pub radius: f64,
 }
 

@@ -58,6 +58,7 @@ impl<R: Float + 'static> Weights<R> {
 
     /// [`Carried::share`] of a vertex where a merge is evaluated and finds `photons` on average (positive; asked for where
     /// [`Heuristic::asks_density`](super::Heuristic::asks_density)). A vertex where none is evaluated has share 0.
+    /// Shares stay as they are if the set has no merges: an emitter hit asks for them.
     #[inline(always)]
     pub fn share(&self, photons: R) -> R {
         match self.merge_weights {
