@@ -2,7 +2,7 @@
 //! of every technique from what two ends carry. [`densities`](super::densities) defines what comes out; the two are held together by test.
 //!
 //! A walk keeps one [`Carried`] a vertex: [`Weights::from_light`] or [`Weights::from_camera`] makes that of the first vertex met,
-//! [`Weights::extend`] every next one. Where two subpaths meet, [`Weights::connection`], [`Weights::next_event`],
+//! [`Weights::extend`] every next one. [`LightEnd`] asks the scene for the light's numbers. Where two subpaths meet, [`Weights::connection`], [`Weights::next_event`],
 //! [`Weights::emitter_hit`], [`Weights::splat`] and [`Weights::merge`] say what the technique at hand weighs against all others.
 //!
 //! The recursion is that of \[VCM-TR\] and [THESIS (2.50), (2.51)], with connections and merges carried apart. So every vertex may have its
@@ -22,14 +22,17 @@
 //!
 //! **Range.** Ratios of densities are carried, raised to the exponent; they grow with the world's unit squared. In f32 and with exponent 2,
 //! paths of ten edges, of edges up to 3,000 units long, lose weights below 1e-20 and no others: an overflow on one side makes a weight 0.
-//! Longer units or larger exponents ask for f64.
+//! A direction of a density below 1e-15 per steradian, in a lobe's far tail, may make one that is not a number; walks count these as
+//! rejected. Longer units or larger exponents ask for f64.
 
 mod carried;
 mod heuristic;
+mod light_end;
 mod weights;
 
 pub use carried::{Carried, Edge, Emission, Scatter};
 pub use heuristic::{Heuristic, HeuristicError, MergeWeights, Sampling, Techniques};
+pub use light_end::LightEnd;
 pub use weights::{Connector, Weights};
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use crate::samplers::{Key, Purpose, Stream, UniformStream};
 use crate::transport::densities::{FullPath, PathVertex, PathWeights};
 use num_traits::{AsPrimitive, Float};
 
+mod scenes;
+
 /// What the light at the path's end is.
 #[derive(Clone, Copy, Debug)]
 enum Light {
