@@ -13,7 +13,7 @@ pub mod ray;
 pub mod shape;
 pub mod texture;
 
-use crate::math::Rgb;
+use crate::math::{Rgb, SolidAnglePdf};
 use accel::Accel;
 use bsdf::Bsdf;
 use camera::{Camera, CameraConnection, CameraError, FilmSpec};
@@ -288,6 +288,13 @@ impl Scene {
     #[inline]
     pub fn emission_pdf_escaped(&self, d: Vec3) -> EmissionPdf {
         self.emitters.emission_pdf_escaped(d)
+    }
+
+    /// Density with which direct sampling at `from`, a point on a ray of light, gives the direction back to where the ray started: what
+    /// [`DirectSample::pdf`] would have been.
+    #[inline]
+    pub fn direct_pdf(&self, sample: &EmissionSample, from: Vec3) -> SolidAnglePdf {
+        self.emitters.direct_pdf(sample, from)
     }
 
     /// Probability with which an emitter is chosen, by direct and by emission sampling.

@@ -1,6 +1,8 @@
 //! How light travels: what happens at a surface point, and the one random walk of both directions.
 
 pub mod class;
+pub mod densities;
 pub mod merge;
+pub mod mis;
 pub mod shading;
 pub mod walk;

@@ -152,11 +152,17 @@ impl Area {
         let Some(cos_light) = emission_cosine(end.n_g, n_s, wo) else {
             return Emitted::default();
         };
-        let pdf_direct = match self.cone(from) {
+        Emitted { radiance: self.radiance.eval(uv), pdf_direct: self.pdf_direct(end, cos_light, from) }
+    }
+
+    /// Density with which direct sampling at `from` gives the direction to a point of the shape, which is seen under `cos_light`; the choice
+    /// of emitter is not included.
+    #[inline]
+    pub(super) fn pdf_direct(&self, end: &Endpoint, cos_light: f32, from: Vec3) -> SolidAnglePdf {
+        match self.cone(from) {
             Some(cone) => cone.pdf(),
             None => self.pdf.to_solid_angle(cos_light, end.p.distance_squared(from)),
-        };
-        Emitted { radiance: self.radiance.eval(uv), pdf_direct }
+        }
     }
 
     /// A position uniform by area, and a direction in proportion to the cosine there; `None` below the shading normal's horizon.

@@ -328,6 +328,17 @@ impl Emitters {
         self.with_choice(id, pdf)
     }
 
+    #[inline]
+    pub(in crate::scene) fn direct_pdf(&self, sample: &EmissionSample, from: Vec3) -> SolidAnglePdf {
+        let id = sample.emitter;
+        let pdf = match &self.list[id.0 as usize] {
+            Emitter::Area(a) => a.pdf_direct(&sample.end, sample.cos_light, from),
+            Emitter::Point(_) | Emitter::Spot(_) | Emitter::Directional(_) => SolidAnglePdf(1.0),
+            Emitter::Constant(_) | Emitter::Envmap(_) => self.environment_along(id, -sample.d).1,
+        };
+        pdf * self.pick_probability(id)
+    }
+
     #[inline(always)]
     fn with_choice(&self, id: EmitterId, pdf: EmissionPdf) -> EmissionPdf {
         EmissionPdf { position: pdf.position * self.pick_probability(id), direction: pdf.direction }
