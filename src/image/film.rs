@@ -142,8 +142,7 @@ impl Film {
     /// tile's pixels, neighbours near each other, and writes one value for each; what was there before means nothing. What it returns
     /// goes to `finish_tile`, in the tiles' order. `tile` is width and height.
     ///
-    /// `memory` is called once for each run of rows that a worker takes, more rarely than there are tiles; the values must not
-    /// depend on what an earlier tile left there.
+    /// `memory` is called once a row of tiles; the values must not depend on what an earlier tile left there.
     pub fn add_eye_tiles<M, A: Send>(
         &mut self,
         tile: [usize; 2],
@@ -174,11 +173,12 @@ impl Film {
             (0..width).step_by(across).map(one).collect::<Vec<A>>()
         };
         let rows = (down * width).max(1);
+        // One row of tiles a task: pieces that rayon sizes by itself are an eighth of the film, and a thread idles for half of one at the end.
         let results: Vec<Vec<A>> = if self.running.is_empty() {
-            let bands = self.sums.eye.par_chunks_mut(rows).enumerate();
+            let bands = self.sums.eye.par_chunks_mut(rows).enumerate().with_max_len(1);
             bands.map_init(start, |own, (index, sums)| fill(own, index, sums, &mut [])).collect()
         } else {
-            let pairs = self.sums.eye.par_chunks_mut(rows).zip(self.running.par_chunks_mut(rows)).enumerate();
+            let pairs = self.sums.eye.par_chunks_mut(rows).zip(self.running.par_chunks_mut(rows)).enumerate().with_max_len(1);
             pairs.map_init(start, |own, (index, (sums, running))| fill(own, index, sums, running)).collect()
         };
         self.sums.eye_count += 1;
