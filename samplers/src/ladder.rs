@@ -221,7 +221,7 @@ impl PhotonSampler for Ladder {
         iteration: u64,
         count: u64,
         start: impl Fn() -> A + Sync,
-        emit: impl Fn(&mut A, &P::Path, Drawn) + Sync,
+        emit: impl Fn(&mut A, &P::Path, &[Drawn]) + Sync,
     ) -> Draw<A>
     where
         P: LightPathSpace,

@@ -38,10 +38,10 @@ pub trait LightPathSpace: Sync {
 /// Number of cells of [`LightPathSpace::cell`]; a larger value is taken modulo this one.
 pub const CELLS: usize = 1024;
 
-/// One light path as a sampler hands it out.
+/// One light path as a sampler hands it out, in one of the strata that it counts for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drawn {
-    /// Number of the path within the iteration, over all strata.
+    /// Number of the path within the iteration, over all strata: that of the first step it was counted in.
     pub index: u64,
     /// The rung that drew it.
     pub stratum: usize,
@@ -51,8 +51,7 @@ pub struct Drawn {
     /// The same within the mixture of all strata but the last, for statistics that shape the last rung's target: they must not depend
     /// on its own paths. Equal to `weight` if there is one stratum; 0 for the last of several.
     pub pilot_weight: f64,
-    /// Counted steps of a chain that this path stands for: a rejected proposal counts the state again, but it is handed out once, when
-    /// the chain leaves it. 1 for an independent path.
+    /// Counted steps at the rung that this path stands for: a rejected proposal counts the state again. 1 at the uniform rung.
     pub repeats: u32,
 }
 
@@ -76,14 +75,15 @@ pub trait PhotonSampler {
     /// Strata the sampler hands out: the length of [`Draw::scales`].
     fn strata(&self) -> usize;
 
-    /// Draws `count` paths of iteration `iteration`. `start` makes an accumulator for each batch, `emit` receives every path.
+    /// Draws `count` paths of iteration `iteration`. `start` makes an accumulator for each batch; `emit` receives every path once, with an
+    /// entry for each stratum that it counts for, ascending: chains that exchange states count the same path at several rungs.
     fn draw<P, A>(
         &mut self,
         space: &P,
         iteration: u64,
         count: u64,
         start: impl Fn() -> A + Sync,
-        emit: impl Fn(&mut A, &P::Path, Drawn) + Sync,
+        emit: impl Fn(&mut A, &P::Path, &[Drawn]) + Sync,
     ) -> Draw<A>
     where
         P: LightPathSpace,
@@ -111,7 +111,7 @@ impl PhotonSampler for Uniform {
         iteration: u64,
         count: u64,
         start: impl Fn() -> A + Sync,
-        emit: impl Fn(&mut A, &P::Path, Drawn) + Sync,
+        emit: impl Fn(&mut A, &P::Path, &[Drawn]) + Sync,
     ) -> Draw<A>
     where
         P: LightPathSpace,
@@ -124,7 +124,7 @@ impl PhotonSampler for Uniform {
             for index in b * BATCH..count.min((b + 1) * BATCH) {
                 let mut stream = Key { seed, iteration, index, purpose: Purpose::Light }.stream();
                 space.trace(&mut stream, &mut path);
-                emit(&mut accumulator, &path, Drawn { index, stratum: 0, weight: 1.0, pilot_weight: 1.0, repeats: 1 });
+                emit(&mut accumulator, &path, &[Drawn { index, stratum: 0, weight: 1.0, pilot_weight: 1.0, repeats: 1 }]);
             }
             accumulator
         };
@@ -150,9 +150,9 @@ mod tests {
     }
 
     fn disk_area(count: u64, iteration: u64) -> f64 {
-        let inside = |sum: &mut f64, p: &[f32; 2], drawn: Drawn| {
+        let inside = |sum: &mut f64, p: &[f32; 2], drawn: &[Drawn]| {
             let r2 = (p[0] - 0.5).powi(2) + (p[1] - 0.5).powi(2);
-            *sum += drawn.weight * f64::from(u8::from(r2 < 0.25));
+            *sum += drawn[0].weight * f64::from(u8::from(r2 < 0.25));
         };
         let draw = Uniform { seed: 3 }.draw(&Square, iteration, count, || 0.0, inside);
         assert_eq!(draw.traced, count);

@@ -39,10 +39,10 @@ pub(crate) struct State<T> {
     pub(crate) values: Vec<f64>,
     pub(crate) life: Life,
     pub(crate) climbed: bool,
-    /// Counted steps since the state was last handed out.
-    pub(crate) repeats: u32,
-    /// Number of the first of them within the iteration.
-    pub(crate) index: u64,
+    /// Counted steps at each rung since the draw began.
+    pub(crate) counts: Vec<u32>,
+    /// Number of the first of them within the iteration; none before one is counted.
+    pub(crate) index: Option<u64>,
     /// Target of the next rung over that of the chain's own.
     pub(crate) ratio: f64,
     /// Logarithm of the last rung's target; that of the smallest normal number for 0.
@@ -60,8 +60,8 @@ impl<T: Default> State<T> {
             values: vec![0.0; rungs],
             life: Life::Empty,
             climbed: false,
-            repeats: 0,
-            index: 0,
+            counts: vec![0; rungs],
+            index: None,
             ratio: 0.0,
             log: 0.0,
         }
@@ -82,6 +82,13 @@ impl<T: Default> State<T> {
         self.coordinates.extend_from_slice(base);
         self.trace(space, random);
         self.life = if self.values[rung] > 0.0 { Life::Alive } else { Life::Dead };
+    }
+
+    /// Counts a step at this rung; `index` is its number.
+    #[inline(always)]
+    pub(crate) fn count(&mut self, rung: usize, index: u64) {
+        self.index.get_or_insert(index);
+        self.counts[rung] += 1;
     }
 
     /// Brings the numbers up to date that belong to the state *at this rung*.

@@ -136,7 +136,7 @@ mod tests {
     fn report() -> ChainReport {
         let settings = LadderSettings { rungs: 3, ensembles: 4, first_burn_in: 10, start_up: 1000, ..LadderSettings::default() };
         let mut ladder = Ladder::new(settings);
-        let _: Draw<()> = ladder.draw(&Line, 0, 4000, || (), |(), _, _: Drawn| ());
+        let _: Draw<()> = ladder.draw(&Line, 0, 4000, || (), |(), _, _: &[Drawn]| ());
         let regions = Some(RegionReport { leaves: 8, in_use: 5 });
         ChainReport { names: vec![Rung::Uniform, Rung::Visibility, Rung::Target], ladder: ladder.report(), regions }
     }

@@ -8,12 +8,38 @@ use crate::samplers::{Draw, Drawn};
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
 
-/// Flux that a path left at a point, in its stratum.
+/// Flux that a path left at a point.
 #[derive(Clone, Copy, Debug)]
 struct Deposit {
     point: u32,
-    stratum: u32,
+    path: PathNumber,
     value: Rgb,
+}
+
+/// Number of a path within its ensemble, and whether this is its first deposit at the point and in the point's region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PathNumber(u32);
+
+impl PathNumber {
+    const FIRST_AT_POINT: u32 = 1 << 31;
+    const FIRST_IN_REGION: u32 = 1 << 30;
+
+    fn index(self) -> usize {
+        (self.0 & !(Self::FIRST_AT_POINT | Self::FIRST_IN_REGION)) as usize
+    }
+
+    fn is(self, flag: u32) -> bool {
+        self.0 & flag != 0
+    }
+}
+
+/// What a path counts for in one stratum.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    path: u32,
+    stratum: u32,
+    weight: f64,
+    pilot_weight: f64,
 }
 
 /// Points of consecutive numbers share a list, so that lists are summed side by side.
@@ -24,10 +50,12 @@ const LISTS: usize = 32;
 pub struct Deposits {
     lists: Vec<Vec<Deposit>>,
     points_a_list: u32,
-    /// Per stratum and leaf: sum of the paths' weights in the mixture that statistics use, once a point.
-    psi: Vec<Vec<f64>>,
-    /// Per leaf: paths that contributed.
-    paths: Vec<f64>,
+    /// Paths that left something.
+    paths: u32,
+    /// Their strata, path by path.
+    shares: Vec<Share>,
+    /// Regions are asked for.
+    regions: bool,
     /// Pairs of the path at hand.
     touches: Vec<Touch>,
     search: Search,
@@ -35,80 +63,120 @@ pub struct Deposits {
     pub tally: Tally,
 }
 
+/// What light paths left at one point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Collected {
+    /// Flux, strata scaled, not yet divided by the kernel size.
+    pub flux: [f64; 3],
+    /// By half of the ensembles (those of even and of odd number): the estimated probability that a uniform path reaches the point,
+    /// `psi_k` [STF (6), (7)]. Each half is an estimate by itself.
+    pub psi: [f64; 2],
+    /// By half: paths whose first deposit in the point's region was here.
+    pub paths: [f64; 2],
+}
+
 impl Deposits {
-    /// Nothing yet. `leaves` is 0 where no statistics are kept.
-    pub fn new(points: usize, strata: usize, leaves: usize) -> Self {
+    /// Nothing yet. `regions` is whether statistics for them are kept.
+    pub fn new(points: usize, regions: bool) -> Self {
         Self {
             lists: vec![Vec::new(); LISTS],
             points_a_list: points.div_ceil(LISTS).max(1) as u32,
-            psi: vec![vec![0.0; leaves]; strata],
-            paths: vec![0.0; leaves],
+            paths: 0,
+            shares: Vec::new(),
+            regions,
             touches: Vec::new(),
             search: Search::default(),
             tally: Tally::default(),
         }
     }
 
-    /// Takes a path as the sampler hands it out.
-    pub fn add(&mut self, points: &Points<'_>, path: &AimedPath, drawn: Drawn) {
+    /// Takes a path as the sampler hands it out: at most 2^30 that leave something.
+    pub fn add(&mut self, points: &Points<'_>, path: &AimedPath, drawn: &[Drawn]) {
         points.touched(&path.light.vertices, &mut self.search, &mut self.touches);
-        if drawn.weight > 0.0 {
-            self.touches.iter().for_each(|touch| points.fetch(touch.point));
-            for touch in &self.touches {
-                let value = points.value(touch.point, &path.light.vertices[touch.vertex as usize]) * drawn.weight as f32;
-                let value = self.tally.finite(value);
-                let list = &mut self.lists[(touch.point / self.points_a_list) as usize];
-                list.push(Deposit { point: touch.point, stratum: drawn.stratum as u32, value });
-            }
+        if self.touches.is_empty() {
+            return;
         }
-        if drawn.pilot_weight > 0.0 && !self.paths.is_empty() {
-            self.learn(points, drawn);
+        self.touches.iter().for_each(|touch| points.fetch(touch.point));
+        let share = |d: &Drawn| Share { path: self.paths, stratum: d.stratum as u32, weight: d.weight, pilot_weight: d.pilot_weight };
+        self.shares.extend(drawn.iter().map(share));
+        for (i, touch) in self.touches.iter().enumerate() {
+            let value = points.value(touch.point, &path.light.vertices[touch.vertex as usize]);
+            let value = self.tally.finite(value);
+            let flags = if self.regions { firsts(points, &self.touches[..i], touch.point) } else { 0 };
+            let list = &mut self.lists[(touch.point / self.points_a_list) as usize];
+            list.push(Deposit { point: touch.point, path: PathNumber(self.paths | flags), value });
         }
+        self.paths += 1;
     }
 
-    /// A path counts once a point, however many of its vertices lie there: `P_k` is a probability.
-    fn learn(&mut self, points: &Points<'_>, drawn: Drawn) {
-        let psi = &mut self.psi[drawn.stratum];
-        for (i, touch) in self.touches.iter().enumerate() {
-            let before = &self.touches[..i];
-            if before.iter().any(|earlier| earlier.point == touch.point) {
-                continue;
-            }
-            let leaf = points.aim(touch.point).leaf;
-            psi[leaf as usize] += drawn.pilot_weight;
-            if !before.iter().any(|earlier| points.aim(earlier.point).leaf == leaf) {
-                self.paths[leaf as usize] += 1.0;
-            }
+    /// Pairs of a light vertex and a measurement point that took it.
+    pub fn count(&self) -> u64 {
+        self.lists.iter().map(|list| list.len() as u64).sum()
+    }
+
+    /// Of every path: its factors on flux and on `psi`, strata scaled.
+    fn factors(&self, scales: &[f64]) -> Vec<[f64; 2]> {
+        let mut factors = vec![[0.0; 2]; self.paths as usize];
+        for share in &self.shares {
+            let scale = scales[share.stratum as usize];
+            let [flux, psi] = &mut factors[share.path as usize];
+            *flux += scale * share.weight;
+            *psi += scale * share.pilot_weight;
         }
+        factors
     }
 }
 
-/// Sum of deposits at every point, strata scaled, and the two halves' statistics: ensembles of even and of odd number, each half an estimate by
-/// itself.
-pub fn collect(draw: &Draw<Deposits>, points: usize) -> (Vec<[f64; 3]>, [Half; 2]) {
-    let mut sums = vec![[0.0; 3]; points];
+/// A path counts once a point, however many of its vertices lie there: `P_k` is a probability.
+fn firsts(points: &Points<'_>, before: &[Touch], point: u32) -> u32 {
+    let leaf = points.aim(point).leaf;
+    let (mut at_point, mut in_region) = (PathNumber::FIRST_AT_POINT, PathNumber::FIRST_IN_REGION);
+    for earlier in before {
+        if earlier.point == point {
+            at_point = 0;
+        }
+        if points.aim(earlier.point).leaf == leaf {
+            in_region = 0;
+        }
+    }
+    at_point | in_region
+}
+
+/// Sums at every point.
+pub fn collect(draw: &Draw<Deposits>, points: usize) -> Vec<Collected> {
+    let factors: Vec<Vec<[f64; 2]>> = draw.batches.par_iter().map(|batch| batch.factors(&draw.scales)).collect();
+    // Scales are for all ensembles together.
+    let count = draw.batches.len();
+    let halves = [count.div_ceil(2), count / 2].map(|members| count as f64 / members.max(1) as f64);
+    let mut sums = vec![Collected::default(); points];
     let each = points.div_ceil(LISTS).max(1);
-    sums.par_chunks_mut(each).enumerate().for_each(|(list, sums)| {
-        for deposit in draw.batches.iter().flat_map(|batch| &batch.lists[list]) {
-            let scale = draw.scales[deposit.stratum as usize];
-            let sum = &mut sums[deposit.point as usize - list * each];
-            deposit.value.to_array().into_iter().zip(sum).for_each(|(value, sum)| *sum += scale * f64::from(value));
+    sums.par_chunks_mut(each).enumerate().with_max_len(1).for_each(|(list, sums)| {
+        for (number, (batch, factors)) in draw.batches.iter().zip(&factors).enumerate() {
+            let half = number % 2;
+            for deposit in &batch.lists[list] {
+                let [flux, psi] = factors[deposit.path.index()];
+                let sum = &mut sums[deposit.point as usize - list * each];
+                deposit.value.to_array().into_iter().zip(&mut sum.flux).for_each(|(value, sum)| *sum += flux * f64::from(value));
+                // A path of the last rung alone has no part in statistics.
+                if psi > 0.0 {
+                    sum.psi[half] += if deposit.path.is(PathNumber::FIRST_AT_POINT) { halves[half] * psi } else { 0.0 };
+                    sum.paths[half] += if deposit.path.is(PathNumber::FIRST_IN_REGION) { 1.0 } else { 0.0 };
+                }
+            }
         }
     });
-    (sums, [half(draw, 0), half(draw, 1)])
+    sums
 }
 
-fn half(draw: &Draw<Deposits>, parity: usize) -> Half {
-    let leaves = draw.batches.first().map_or(0, |batch| batch.paths.len());
-    let mut half = Half { psi: vec![0.0; leaves], paths: vec![0.0; leaves] };
-    let members = || draw.batches.iter().skip(parity).step_by(2);
-    // Scales are for all ensembles together.
-    let share = draw.batches.len() as f64 / members().count().max(1) as f64;
-    for batch in members() {
-        for (psi, scale) in batch.psi.iter().zip(&draw.scales) {
-            half.psi.iter_mut().zip(psi).for_each(|(sum, value)| *sum += share * scale * value);
+/// The two halves' statistics of regions, from those of their points.
+pub fn halves(collected: &[Collected], leaf: impl Fn(usize) -> u32, leaves: usize) -> [Half; 2] {
+    [0, 1].map(|half| {
+        let mut sums = Half { psi: vec![0.0; leaves], paths: vec![0.0; leaves] };
+        for (point, at) in collected.iter().enumerate() {
+            let leaf = leaf(point) as usize;
+            sums.psi[leaf] += at.psi[half];
+            sums.paths[leaf] += at.paths[half];
         }
-        half.paths.iter_mut().zip(&batch.paths).for_each(|(sum, value)| *sum += value);
-    }
-    half
+        sums
+    })
 }

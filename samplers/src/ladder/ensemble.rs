@@ -121,11 +121,13 @@ struct Ensemble<'a, P: LightPathSpace, A, E> {
     tallies: Vec<Tally>,
     accumulator: A,
     emit: &'a E,
+    /// Of the path handed out.
+    drawn: Vec<Drawn>,
     traced: u64,
 }
 
 /// Runs ensemble number `ensemble` for `steps` steps, whose numbers begin with `first`; `chains` are its stored chains.
-pub(super) fn run<P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)>(
+pub(super) fn run<P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])>(
     space: &P,
     plan: &Plan<'_>,
     ensemble: u64,
@@ -155,7 +157,7 @@ pub(super) fn run<P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)>(
     run.finish(chains)
 }
 
-impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A, E> {
+impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P, A, E> {
     /// Replays the stored states under the present targets.
     fn new(space: &'a P, plan: &'a Plan<'a>, ensemble: u64, chains: &[Chain], accumulator: A, emit: &'a E) -> Self {
         let rungs = plan.shares.len();
@@ -175,16 +177,17 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
             states.push(state);
         }
         let steps = chains.iter().map(|chain| (chain.step.clone(), chain.turn)).collect();
-        Self { space, plan, random, states, steps, proposal: State::new(rungs), tallies, accumulator, emit, traced }
+        Self { space, plan, random, states, steps, proposal: State::new(rungs), tallies, accumulator, emit, drawn: Vec::new(), traced }
     }
 
     /// Hands out what is left and stores the chains.
     fn finish(mut self, chains: &mut [Chain]) -> Outcome<A> {
-        for rung in 1..=self.states.len() {
-            self.leave(rung);
-        }
-        for ((chain, state), (step, turn)) in chains.iter_mut().zip(self.states).zip(self.steps) {
-            *chain = Chain { coordinates: state.coordinates, life: state.life, climbed: state.climbed, step, turn };
+        for (rung, chain) in (1..).zip(chains) {
+            let state = &mut self.states[rung - 1];
+            let (step, turn) = self.steps[rung - 1].clone();
+            *chain = Chain { coordinates: std::mem::take(&mut state.coordinates), life: state.life, climbed: state.climbed, step, turn };
+            std::mem::swap(state, &mut self.proposal);
+            self.hand_out();
         }
         Outcome { accumulator: self.accumulator, tallies: self.tallies, traced: self.traced }
     }
@@ -225,34 +228,44 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
     fn uniform_step(&mut self, counted: Option<Place>) {
         self.propose(0, Proposal::Independent, counted.is_some());
         if let Some(place) = counted {
-            self.count_uniform(place);
+            let tally = &mut self.tallies[0];
+            tally.steps[place.block] += 1;
+            if let Some(next) = self.proposal.values.get(1) {
+                tally.ratio.add(place.block, *next);
+            }
+            sample(tally, self.plan, 0, &self.proposal, self.space);
+            self.proposal.count(0, place.index);
         }
-        if self.states.is_empty() || !self.plan.exchanges {
-            return;
+        if !self.states.is_empty() && self.plan.exchanges {
+            self.exchange_with_independent(counted.is_some());
         }
+        // Left at once, unless rung 1 has taken it and left its own.
+        self.hand_out();
+    }
+
+    fn exchange_with_independent(&mut self, counted: bool) {
         let (new, old) = (self.proposal.values[1], self.states[0].values[1]);
         let alive = self.states[0].life == Life::Alive;
         let taken = new > 0.0 && (!alive || self.random.chance() * old < new);
-        if counted.is_some() {
+        if counted {
             self.tallies[0].attempts += 1;
             self.tallies[0].exchanged += u64::from(taken);
         }
         if taken {
-            self.tallies[0].round_trips += u64::from(self.states[0].climbed && counted.is_some());
+            self.tallies[0].round_trips += u64::from(self.states[0].climbed && counted);
             self.take(1, false);
         }
     }
 
-    /// The proposal becomes the state of `rung`; `climbed` is whether it has been on the last rung.
+    /// The proposal becomes the state of `rung`; `climbed` is whether it has been on the last rung. The old state is left.
     #[inline]
     fn take(&mut self, rung: usize, climbed: bool) {
-        self.leave(rung);
         let state = &mut self.states[rung - 1];
         std::mem::swap(state, &mut self.proposal);
-        state.repeats = 0;
         state.life = Life::Alive;
         state.climbed = climbed;
         state.settle(rung);
+        self.hand_out();
     }
 
     fn chain_step(&mut self, rung: usize, counted: Option<Place>) {
@@ -295,27 +308,10 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         self.exchange_by_turns(rung, counted.is_some());
     }
 
-    /// An independent path is counted and handed out at once: it never stands for more than one step.
-    #[inline]
-    fn count_uniform(&mut self, place: Place) {
-        let tally = &mut self.tallies[0];
-        tally.steps[place.block] += 1;
-        if let Some(next) = self.proposal.values.get(1) {
-            tally.ratio.add(place.block, *next);
-        }
-        sample(tally, self.plan, 0, &self.proposal, self.space);
-        self.proposal.repeats = 1;
-        self.proposal.index = place.index;
-        hand_out(self.space, self.plan, 0, &mut self.proposal, tally, &mut self.accumulator, self.emit);
-    }
-
     #[inline]
     fn count(&mut self, rung: usize, place: Place) {
         let (state, tally) = (&mut self.states[rung - 1], &mut self.tallies[rung]);
-        if state.repeats == 0 {
-            state.index = place.index;
-        }
-        state.repeats += 1;
+        state.count(rung, place.index);
         tally.steps[place.block] += 1;
         tally.ratio.add(place.block, state.ratio);
         tally.log.add(place.block, state.log);
@@ -332,13 +328,23 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
         sample(tally, self.plan, rung, state, self.space);
     }
 
-    /// Hands the state of `rung` out for the steps it was counted in.
+    /// Hands out what the buffer of proposals holds, for the steps it was counted in at every rung.
     #[inline]
-    fn leave(&mut self, rung: usize) {
-        let (state, tally) = (&mut self.states[rung - 1], &mut self.tallies[rung]);
-        if state.repeats > 0 {
-            hand_out(self.space, self.plan, rung, state, tally, &mut self.accumulator, self.emit);
+    fn hand_out(&mut self) {
+        let state = &mut self.proposal;
+        let Some(index) = state.index.take() else { return };
+        let cell = self.space.cell(&state.path).map(|cell| cell as usize % CELLS);
+        self.drawn.clear();
+        for (rung, count) in state.counts.iter_mut().enumerate().filter(|(_, count)| **count > 0) {
+            let repeats = std::mem::take(count);
+            let (weight, pilot) = self.plan.mixture.of(rung, &state.values);
+            let [weight, pilot_weight] = [weight, pilot].map(|weight| f64::from(repeats) * weight);
+            self.drawn.push(Drawn { index, stratum: rung, weight, pilot_weight, repeats });
+            if let Some(cell) = cell {
+                self.tallies[rung].cells[cell] += repeats;
+            }
         }
+        (self.emit)(&mut self.accumulator, &state.path, &self.drawn);
     }
 
     /// Exchanges with the rung above on even steps of the chain, with the one below on odd ones; rung 0 has its own way.
@@ -374,8 +380,6 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, Drawn)> Ensemble<'a, P, A
             self.tallies[low].exchanged += u64::from(swapped);
         }
         if swapped {
-            self.leave(low);
-            self.leave(high);
             self.states.swap(low - 1, high - 1);
             self.states[low - 1].settle(low);
             self.states[high - 1].settle(high);
@@ -407,25 +411,4 @@ fn sample<P: LightPathSpace>(tally: &mut Tally, plan: &Plan<'_>, rung: usize, st
         tally.samples.push(space.usefulness(&state.path));
     }
     tally.until_sample -= 1;
-}
-
-#[inline]
-fn hand_out<P: LightPathSpace, A>(
-    space: &P,
-    plan: &Plan<'_>,
-    rung: usize,
-    state: &mut State<P::Path>,
-    tally: &mut Tally,
-    accumulator: &mut A,
-    emit: &impl Fn(&mut A, &P::Path, Drawn),
-) {
-    let (weight, pilot) = plan.mixture.of(rung, &state.values);
-    let repeats = f64::from(state.repeats);
-    if let Some(cell) = space.cell(&state.path) {
-        tally.cells[cell as usize % CELLS] += state.repeats;
-    }
-    let drawn =
-        Drawn { index: state.index, stratum: rung, weight: repeats * weight, pilot_weight: repeats * pilot, repeats: state.repeats };
-    emit(accumulator, &state.path, drawn);
-    state.repeats = 0;
 }

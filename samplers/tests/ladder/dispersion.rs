@@ -17,8 +17,9 @@ fn dispersion_predicts_the_scatter_of_independent_runs() {
     for (run, counts) in counts.iter_mut().enumerate() {
         let mut ladder = Ladder::new(LadderSettings { combine: Combine::Average, ..settings(run as u64, 4) });
         ladder.draw(&space, 0, COUNT, || (), |_, _, _| {});
-        let emit = |list: &mut Vec<(usize, usize, f64)>, p: &[f32; 2], drawn: Drawn| {
-            list.push((drawn.stratum, (p[1] * 8.0) as usize * 8 + (p[0] * 8.0) as usize, f64::from(drawn.repeats)));
+        let emit = |list: &mut Vec<(usize, usize, f64)>, p: &[f32; 2], drawn: &[Drawn]| {
+            let cell = (p[1] * 8.0) as usize * 8 + (p[0] * 8.0) as usize;
+            list.extend(drawn.iter().map(|drawn| (drawn.stratum, cell, f64::from(drawn.repeats))));
         };
         for (rung, cell, repeats) in ladder.draw(&space, 1, COUNT, Vec::new, emit).batches.into_iter().flatten() {
             counts[rung][cell] += repeats;

@@ -91,10 +91,12 @@ pub(crate) fn integrals<P: LightPathSpace, const N: usize>(
     f: impl Fn(&P::Path) -> [f64; N] + Sync,
 ) -> [f64; N] {
     let strata = ladder.strata();
-    let emit = |sums: &mut Vec<[f64; N]>, path: &P::Path, drawn: Drawn| {
-        let w = weight(&drawn);
-        for (sum, f) in sums[drawn.stratum].iter_mut().zip(f(path)) {
-            *sum += w * f;
+    let emit = |sums: &mut Vec<[f64; N]>, path: &P::Path, drawn: &[Drawn]| {
+        for drawn in drawn {
+            let w = weight(drawn);
+            for (sum, f) in sums[drawn.stratum].iter_mut().zip(f(path)) {
+                *sum += w * f;
+            }
         }
     };
     let draw = ladder.draw(space, iteration, count, || vec![[0.0; N]; strata], emit);
@@ -114,12 +116,13 @@ pub(crate) fn total<const N: usize>(draw: &Draw<Vec<[f64; N]>>) -> [f64; N] {
     all
 }
 
-/// Everything a draw hands out, in order, with the path.
+/// Everything a draw hands out, in order, with the path: once a stratum.
 pub(crate) fn everything<P: LightPathSpace>(ladder: &mut Ladder, space: &P, iteration: u64, count: u64) -> Draw<Vec<(P::Path, Drawn)>>
 where
     P::Path: Clone,
 {
-    ladder.draw(space, iteration, count, Vec::new, |list: &mut Vec<_>, path: &P::Path, drawn| list.push((path.clone(), drawn)))
+    let emit = |list: &mut Vec<_>, path: &P::Path, drawn: &[Drawn]| list.extend(drawn.iter().map(|drawn| (path.clone(), *drawn)));
+    ladder.draw(space, iteration, count, Vec::new, emit)
 }
 
 /// A point of the unit square and a target of four nested functions on it: 1; a disk of radius 0.4 in the middle; a factor constant

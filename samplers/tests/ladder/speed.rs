@@ -36,7 +36,7 @@ fn speed_of_a_step() {
         for iteration in 0..8 {
             let begin = Instant::now();
             let draw = one.install(|| {
-                ladder.draw(&Trivial, iteration, 1_000_000, || 0.0f64, |sum, path, drawn| *sum += drawn.weight * f64::from(*path))
+                ladder.draw(&Trivial, iteration, 1_000_000, || 0.0f64, |sum, path, drawn| *sum += drawn[0].weight * f64::from(*path))
             });
             best = best.min(begin.elapsed().as_secs_f64() * 1e9 / draw.traced as f64);
         }

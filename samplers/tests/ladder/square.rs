@@ -61,7 +61,9 @@ fn wrong_assumed_normalisations_cost_variance_alone() {
         let mut ladder = Ladder::new(settings(seed, 4));
         let doubled = [1.0, 2.0 * b[1], 2.0 * b[2], 2.0 * b[3]];
         assert!(ladder.assume_normalisations(&doubled));
-        let emit = |sums: &mut [f64; 4], p: &[f32; 2], drawn: isophote_samplers::Drawn| sums[drawn.stratum] += drawn.weight * on_disk(p)[0];
+        let emit = |sums: &mut [f64; 4], p: &[f32; 2], drawn: &[isophote_samplers::Drawn]| {
+            drawn.iter().for_each(|drawn| sums[drawn.stratum] += drawn.weight * on_disk(p)[0]);
+        };
         let draw = ladder.draw(&space, 0, COUNT, || [0.0; 4], emit);
         let report = ladder.report();
         let sum = |c: usize| draw.batches.iter().map(|batch| batch[c]).sum::<f64>() * draw.scales[c];

@@ -11,7 +11,7 @@ use crate::photons::radius::shrink;
 use crate::samplers::{Ladder, PhotonSampler};
 use crate::targets::aim::{Aimer, Place, Rung};
 use crate::targets::aimed::AimedPaths;
-use crate::targets::deposits::{Deposits, collect};
+use crate::targets::deposits::{Deposits, collect, halves};
 use crate::targets::points::{MeasurementPoint, Points};
 use crate::targets::regions::Regions;
 use crate::targets::tallies::Tallies;
@@ -93,20 +93,21 @@ impl Aimed {
         let tallies = Tallies::default();
         let space = AimedPaths { light, cells: aimer.cells(), points: &points, rungs: &self.rungs, tallies: &tallies };
         let leaves = aimer.regions.as_ref().map_or(0, Regions::leaves);
-        let (count, strata) = (points.all().len(), self.ladder.strata());
-        let start = || Deposits::new(count, strata, leaves);
+        let count = points.all().len();
+        let start = || Deposits::new(count, aimer.regions.is_some());
         let paths = if light.max_depth == 0 { 0 } else { sppm.photon_count };
         let draw = self.ladder.draw(&space, i, paths, start, |deposits, path, drawn| deposits.add(&points, path, drawn));
         stats.light_paths += draw.traced;
         stats.count(&tallies.total());
         draw.batches.iter().for_each(|deposits| stats.count(&deposits.tally));
-        let (sums, halves) = collect(&draw, count);
+        let sums = collect(&draw, count);
 
         // Statistics for the next iteration's target.
         if let Some(regions) = &mut aimer.regions {
             let mut sizes = vec![0.0; leaves];
             points.all().iter().zip(&aims).for_each(|(m, aim)| sizes[aim.leaf as usize] += f64::from(m.kernel_size()));
-            regions.add(&sizes, [&halves[0], &halves[1]]);
+            let [even, odd] = halves(&sums, |point| aims[point].leaf, leaves);
+            regions.add(&sizes, [&even, &odd]);
         }
 
         self.aimer = Some(aimer);
@@ -114,7 +115,7 @@ impl Aimed {
         // The image.
         for (at, sum) in points.all().iter().zip(sums) {
             let scale = 1.0 / f64::from(at.kernel_size());
-            let [r, g, b] = sum.map(|v| (v * scale) as f32);
+            let [r, g, b] = sum.flux.map(|v| (v * scale) as f32);
             values[at.pixel as usize] += at.throughput * Rgb::new(r, g, b);
         }
         let width = sppm.eye.size.0;

@@ -33,16 +33,18 @@ impl Sppm<'_> {
     /// Light subpaths to photons, sorted into a grid.
     fn shoot(&self, i: u64, stats: &mut IterationStats) -> (PhotonGrid, Vec<f64>) {
         let paths = self.light_paths();
-        let keep = |(photons, tally): &mut (Vec<Photon>, Tally), path: &LightPath, drawn: Drawn| {
+        let keep = |(photons, tally): &mut (Vec<Photon>, Tally), path: &LightPath, drawn: &[Drawn]| {
             tally.add(&path.tally);
-            photons.extend(path.vertices.iter().map(|v| Photon {
-                p: v.end.p,
-                n_g: v.end.n_g,
-                wi: v.wi,
-                flux: v.flux * drawn.weight as f32,
-                depth: v.depth as u16,
-                stratum: drawn.stratum as u16,
-            }));
+            for drawn in drawn {
+                photons.extend(path.vertices.iter().map(|v| Photon {
+                    p: v.end.p,
+                    n_g: v.end.n_g,
+                    wi: v.wi,
+                    flux: v.flux * drawn.weight as f32,
+                    depth: v.depth as u16,
+                    stratum: drawn.stratum as u16,
+                }));
+            }
         };
         let mut sampler = Uniform { seed: self.eye.common.seed };
         let count = if paths.max_depth == 0 { 0 } else { self.photon_count };
