@@ -45,8 +45,8 @@ pub(crate) struct State<T> {
     pub(crate) index: Option<u64>,
     /// Target of the next rung over that of the chain's own.
     pub(crate) ratio: f64,
-    /// Logarithm of the last rung's target; that of the smallest normal number for 0.
-    pub(crate) log: f64,
+    /// [`State::log`], once asked for.
+    log: Option<f64>,
 }
 
 /// Room for coordinates from the start: more than most paths use.
@@ -63,7 +63,7 @@ impl<T: Default> State<T> {
             counts: vec![0; rungs],
             index: None,
             ratio: 0.0,
-            log: 0.0,
+            log: None,
         }
     }
 
@@ -74,6 +74,14 @@ impl<T: Default> State<T> {
         space.trace(&mut stream, &mut self.path);
         stream.finish();
         space.targets(&self.path, &mut self.values);
+        self.log = None;
+    }
+
+    /// Logarithm of the last rung's target; that of the smallest normal number for 0.
+    #[inline]
+    pub(crate) fn log(&mut self) -> f64 {
+        let value = self.values[self.values.len() - 1];
+        *self.log.get_or_insert_with(|| value.max(f64::MIN_POSITIVE).ln())
     }
 
     /// The stored state under the present targets.
@@ -96,7 +104,6 @@ impl<T: Default> State<T> {
     pub(crate) fn settle(&mut self, rung: usize) {
         let last = self.values.len() - 1;
         self.ratio = if rung < last && self.values[rung] > 0.0 { self.values[rung + 1] / self.values[rung] } else { 0.0 };
-        self.log = self.values[last].max(f64::MIN_POSITIVE).ln();
         self.climbed |= rung == last;
     }
 }

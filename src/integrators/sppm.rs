@@ -51,7 +51,7 @@ impl Settings for SppmSettings {
         let eye = Eye { scene, common: common.clone(), size, threshold };
         let aimed = self.photons.ladder().map(|ladder| Aimed::new(&self.photons, &ladder, common.seed));
         let photon_count = self.photons.photon_count(size);
-        Ok(Box::new(Sppm { eye, settings: self.photons.clone(), photon_count, cell: 0.0, aimed, glossy: Glossy::default() }))
+        Ok(Box::new(Sppm { eye, settings: self.photons.clone(), photon_count, cell: 0.0, aimed, counts: Counts::default() }))
     }
 }
 
@@ -64,7 +64,22 @@ struct Sppm<'a> {
     cell: f32,
     /// Chains and their targets; `None` with the uniform sampler.
     aimed: Option<Aimed>,
+    counts: Counts,
+}
+
+/// What an iteration counts beside rays and paths.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    /// Pairs of a light vertex and a measurement point that took it.
+    deposits: u64,
     glossy: Glossy,
+}
+
+impl Counts {
+    fn add(&mut self, other: &Counts) {
+        self.deposits += other.deposits;
+        self.glossy.add(&other.glossy);
+    }
 }
 
 /// Camera subpaths that met a smooth lobe that was no delta and no rough one, and what they saw: left out in [STF 5].
@@ -140,16 +155,16 @@ impl Integrator for Sppm<'_> {
 
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
         let mut stats = IterationStats { camera_paths: self.eye.pixels() as u64, ..IterationStats::default() };
-        let glossy = match self.aimed.take() {
+        let counts = match self.aimed.take() {
             Some(mut aimed) => {
                 let rests = aimed.rests(self.photon_count);
-                let glossy = if rests { self.iterate_uniform(i, film, &mut stats) } else { aimed.iterate(self, i, film, &mut stats) };
+                let counts = if rests { self.iterate_uniform(i, film, &mut stats) } else { aimed.iterate(self, i, film, &mut stats) };
                 self.aimed = Some(aimed);
-                glossy
+                counts
             }
             None => self.iterate_uniform(i, film, &mut stats),
         };
-        self.glossy.add(&glossy);
+        self.counts.add(&counts);
         stats
     }
 
@@ -158,18 +173,19 @@ impl Integrator for Sppm<'_> {
     }
 
     fn diagnostics(&self) -> Option<Value> {
-        let mut document = json!({});
-        if self.glossy.paths > 0 {
+        let Counts { deposits, glossy } = self.counts;
+        let mut document = json!({ "deposits": deposits });
+        if glossy.paths > 0 {
             document["glossy_paths"] = json!({
-                "camera_paths": self.glossy.paths,
-                "mean_luminance": self.glossy.luminance / self.glossy.samples.max(1) as f64,
+                "camera_paths": glossy.paths,
+                "mean_luminance": glossy.luminance / glossy.samples.max(1) as f64,
                 "counted": self.settings.glossy_paths == GlossyPaths::Keep,
             });
         }
         if let Some(aimed) = &self.aimed {
             document["sampler"] = aimed.report().to_json();
         }
-        document.as_object().is_some_and(|map| !map.is_empty()).then_some(document)
+        Some(document)
     }
 
     fn chains(&self) -> Option<ChainReport> {

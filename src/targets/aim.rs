@@ -8,6 +8,7 @@ use super::points::{DepthRange, MeasurementPoint};
 use super::regions::{Refinement, Regions};
 use clap::ValueEnum;
 use glam::Vec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A target function of a ladder.
@@ -151,7 +152,7 @@ impl Aimer {
     }
 
     fn aims(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> Vec<Aim> {
-        let sizes: Vec<f64> = points.iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
+        let sizes: Vec<f64> = points.par_iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
         if sizes.is_empty() {
             return Vec::new();
         }
@@ -162,7 +163,7 @@ impl Aimer {
         });
         let leaf = |m| self.regions.as_ref().map_or(0, |regions| regions.leaf(self.place.of(m)));
         let aim = |(m, size): (_, &f64)| Aim { kernel: (inverse(size / largest) / mean) as f32, full: 0.0, leaf: leaf(m) };
-        let mut aims = points.iter().zip(&sizes).map(aim).collect();
+        let mut aims = points.par_iter().zip(&sizes).map(aim).collect();
         self.fill(&mut aims);
         aims
     }

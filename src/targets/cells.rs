@@ -13,12 +13,16 @@ use super::light_paths::LightVertex;
 use super::points::{DepthRange, MeasurementPoint};
 use crate::math::fetch;
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 use table::{Key, Probe, Table};
 
 mod table;
 
 /// Sizes of cells, each half as wide as the one before.
 const LEVELS: i32 = 32;
+
+/// Points whose places are kept one by one: 16 MiB.
+const MOST_ARRIVED: usize = 1 << 21;
 
 /// What has been seen in one cell.
 #[derive(Clone, Copy, Debug)]
@@ -81,11 +85,25 @@ fn face(n: Vec3) -> u8 {
 }
 
 /// Points of one region in one cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Part {
-    cell: u32,
-    leaf: u32,
+    /// Number of the cell in the high half, of the region in the low one.
+    place: u64,
     points: u32,
+}
+
+impl Part {
+    fn place(cell: u32, leaf: u32) -> u64 {
+        u64::from(cell) << 32 | u64::from(leaf)
+    }
+
+    fn cell(self) -> usize {
+        (self.place >> 32) as usize
+    }
+
+    fn leaf(self) -> u32 {
+        self.place as u32
+    }
 }
 
 /// What light vertices of a cell are worth.
@@ -103,7 +121,10 @@ pub struct Cells {
     /// Binary logarithm of the widest side; set by the first points.
     top: Option<i32>,
     known: Table<Content>,
+    /// By place.
     parts: Vec<Part>,
+    /// Places of points that are not among the parts yet.
+    arrived: Vec<u64>,
     /// Cells with points when targets were last made.
     made_of: usize,
     /// Sides' reciprocals, widest first.
@@ -141,6 +162,7 @@ impl Cells {
             top: None,
             known: Table::default(),
             parts: Vec::new(),
+            arrived: Vec::new(),
             made_of: 0,
             inverse_sides: Vec::new(),
             present: vec![0],
@@ -154,7 +176,6 @@ impl Cells {
         let exponent = |m: &MeasurementPoint<'_>| m.radius.max(m.footprint).log2().ceil() as i32;
         let Some(widest) = points.iter().map(exponent).max() else { return };
         let top = *self.top.get_or_insert(widest);
-        let mut parts: Vec<Part> = Vec::with_capacity(points.len());
         for (m, aim) in points.iter().zip(aims) {
             let level = (top - exponent(m)).clamp(0, LEVELS - 1);
             let p = m.point.end.p;
@@ -164,12 +185,21 @@ impl Cells {
             (content.low, content.high) = (content.low.min(p), content.high.max(p));
             content.reach = content.reach.max(m.radius);
             content.gate.join(Gate::of(m));
-            parts.push(Part { cell, leaf: aim.leaf, points: 1 });
+            self.arrived.push(Part::place(cell, aim.leaf));
         }
-        self.parts.append(&mut parts);
-        self.parts.sort_unstable();
+        if self.arrived.len() > MOST_ARRIVED {
+            self.sort_in();
+        }
+    }
+
+    /// Counts the points that have arrived among the parts.
+    fn sort_in(&mut self) {
+        self.arrived.par_sort_unstable();
+        self.parts.extend(self.arrived.drain(..).map(|place| Part { place, points: 1 }));
+        // Two sorted runs: a stable sort merges them.
+        self.parts.sort_by_key(|part| part.place);
         self.parts.dedup_by(|next, kept| {
-            let same = (next.cell, next.leaf) == (kept.cell, kept.leaf);
+            let same = next.place == kept.place;
             kept.points += if same { next.points } else { 0 };
             same
         });
@@ -184,10 +214,11 @@ impl Cells {
     /// over these neighbours. `inverse_density` is the factor of the full target in a region.
     pub fn set(&mut self, inverse_density: impl Fn(u32) -> f64) {
         let Some(top) = self.top else { return };
+        self.sort_in();
         self.made_of = self.known.len();
         let mut densities = vec![0.0; self.known.len()];
         for part in &self.parts {
-            densities[part.cell as usize] += f64::from(part.points) * inverse_density(part.leaf);
+            densities[part.cell()] += f64::from(part.points) * inverse_density(part.leaf());
         }
         let own = |cell: usize, content: &Content| {
             let kernel = content.kernel / content.points;

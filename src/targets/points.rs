@@ -8,6 +8,7 @@ use crate::transport::merge::{accepts, merge};
 use crate::transport::shading::SurfacePoint;
 use disks::{DiskGrid, Lookup};
 use glam::Vec3;
+use rayon::prelude::*;
 use std::f32::consts::PI;
 
 mod disks;
@@ -83,23 +84,29 @@ pub struct Points<'a> {
     threshold: f32,
 }
 
+/// Where measurement points lie.
+#[derive(Debug)]
+pub struct PointGrid(DiskGrid);
+
+impl PointGrid {
+    /// Sorts points into a grid.
+    pub fn build(points: &[MeasurementPoint<'_>]) -> Self {
+        let balls: Vec<(Vec3, f32)> = points.par_iter().map(|m| (m.point.end.p, m.radius)).collect();
+        Self(DiskGrid::build(&balls))
+    }
+}
+
 impl<'a> Points<'a> {
-    /// Sorts the points into a grid. `threshold` is the roughness from which lobes are measured at. They aim at nothing yet.
-    pub fn new(points: Vec<MeasurementPoint<'a>>, depths: DepthRange, threshold: f32) -> Self {
-        let disk = |m: &MeasurementPoint<'_>| Disk { n_g: m.point.end.n_g, n_s: m.point.frame.n, depth: m.depth, aim: Aim::default() };
-        let disks = points.iter().map(disk).collect();
-        let grid = DiskGrid::build(points.iter().map(|m| (m.point.end.p, m.radius)));
+    /// Points with their grid and their targets, in their order. `threshold` is the roughness from which lobes are measured at.
+    pub fn new(points: Vec<MeasurementPoint<'a>>, PointGrid(grid): PointGrid, aims: &[Aim], depths: DepthRange, threshold: f32) -> Self {
+        let disk = |(m, aim): (&MeasurementPoint<'_>, &Aim)| Disk { n_g: m.point.end.n_g, n_s: m.point.frame.n, depth: m.depth, aim: *aim };
+        let disks = points.par_iter().zip(aims).map(disk).collect();
         Self { points, disks, grid, depths, threshold }
     }
 
     /// The points, in pixel order.
     pub fn all(&self) -> &[MeasurementPoint<'a>] {
         &self.points
-    }
-
-    /// Sets the points' targets, in their order.
-    pub fn set_aims(&mut self, aims: impl IntoIterator<Item = Aim>) {
-        self.disks.iter_mut().zip(aims).for_each(|(disk, aim)| disk.aim = aim);
     }
 
     /// Targets and region of a point.

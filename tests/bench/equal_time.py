@@ -17,7 +17,8 @@ relative standard deviation over seeds of the last rung's normalisation (in the 
 
 A pair of relMSE is decided twice, on relMSE as it is and with the floor subtracted: a verdict stands where both agree and the floor is less than half
 of relMSE, otherwise the reference is too noisy to tell ("floor"). A pair of `nsd` is decided by the jackknife over seeds, and adds none. `cost` is CPU
-seconds a light path traced; `cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count. Seeds are added
+seconds a light path traced; `cost_kept` CPU seconds a path asked for by --photons, so that start-up and burn-in cost and do not count; `cost_deposit` CPU
+seconds a photon deposited at a measurement point. Seeds are added
 until every pair's interval is narrow (paired.py) or there are --most-seeds. `means` is the ratio of the means over seeds, by bootstrap: far from the
 ratio, it tells of rare bad seeds.
 
@@ -33,7 +34,7 @@ import numpy as np
 import paired
 import runs
 
-PER_SEED = ("relmse", "rmse", "cv", "cost", "cost_kept")
+PER_SEED = ("relmse", "rmse", "cv", "cost", "cost_kept", "cost_deposit")
 
 
 def say(text):
@@ -59,6 +60,8 @@ class Measured:
             return self.rounds.column(name, "cpu_seconds") / self.rounds.column(name, "light_paths")
         if metric == "cost_kept":
             return self.rounds.column(name, "cpu_seconds") / (self.rounds.column(name, "photons") * self.rounds.column(name, "iterations"))
+        if metric == "cost_deposit":
+            return self.rounds.column(name, "cpu_seconds") / self.rounds.column(name, "deposits")
         found = np.array([e[metric] for e in self.errors[name]], dtype=float)
         if metric == "relmse":
             return (found - floor) * self.mismatch(name)

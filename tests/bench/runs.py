@@ -183,7 +183,8 @@ class Rounds:
             document = self.one(name, self.first_seed + k, self.iterations[name])
             found[name] = {key: document[key] for key in ("cpu_seconds", "light_paths", "rejected", "non_finite_pixels")}
             found[name]["iterations"] = self.iterations[name]
-            found[name] |= {"alpha": document["settings"]["alpha"], "photons": document["settings"].get("photons"), "b": normalisations(document)}
+            found[name] |= {"alpha": document["settings"]["alpha"], "photons": document["settings"].get("photons"), "b": normalisations(document),
+                            "deposits": (document.get("diagnostics") or {}).get("deposits")}
         self.rounds.append(found)
         self.save()
         self.say(f"round {k + 1}: " + ", ".join(f"{name} {found[name]['cpu_seconds']:.2f} s" for name in self.variants))

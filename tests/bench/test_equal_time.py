@@ -35,7 +35,8 @@ class MadeUp:
         cpu = (START + EACH[name] * iterations) * self.speed * math.exp(self.generator.normal(0, 0.05))
         deviation = self.truth * math.sqrt(VARIANCE[name] / iterations) * math.exp(self.generator.normal(0, 0.03))
         runs.exr.write(output, self.truth + deviation * self.generator.normal(size=SHAPE))
-        return {"cpu_seconds": cpu, "light_paths": 1000 * iterations, "rejected": {}, "non_finite_pixels": 0, "settings": {"alpha": 1.0, "photons": 1000}}
+        return {"cpu_seconds": cpu, "light_paths": 1000 * iterations, "rejected": {}, "non_finite_pixels": 0, "settings": {"alpha": 1.0, "photons": 1000},
+                "diagnostics": {"deposits": 500 * iterations}}
 
 
 def measured(folder, truth, floor, **budget):
@@ -48,7 +49,7 @@ def measured(folder, truth, floor, **budget):
     with open(scene, "w") as f:
         f.write("<scene/>")
     entry = {"name": "made up", "scene": scene, "reference": mean, "variants": {"a": "a", "b": "b"},
-             "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57"], **budget}
+             "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57", "cost_deposit:a/b<=0.5"], **budget}
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         return equal_time.measure(entry, MadeUp(truth), os.path.join(folder, f"runs {floor} {budget}"), 16, 16)
 
@@ -72,6 +73,8 @@ def test():
             check(f"{budget}: the interval holds the known ratio", pair["interval"]["low"] < known < pair["interval"]["high"],
                   f"{pair['interval']['ratio']:.3f} for {known:.3f}")
             check(f"{budget}: met, for relMSE and NSD", pair["verdict"] == "met" and d["pairs"][1]["verdict"] == "met")
+            deposit = d["pairs"][5]
+            check(f"{budget}: cost of a photon deposited", deposit["verdict"] == "met", f"{deposit['interval']['ratio']:.3f}")
             check(f"{budget}: cost of a path", d["pairs"][2]["verdict"] == "met", f"{d['pairs'][2]['interval']['ratio']:.3f}")
             for name, row in d["rows"].items():
                 check(f"{budget}: {name} has no bias", abs(row["bias"]) < 0.05 * row["relmse_as_rendered"], f"{row['bias'] / row['relmse_as_rendered']:.4f}")

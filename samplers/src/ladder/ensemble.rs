@@ -314,10 +314,10 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
         state.count(rung, place.index);
         tally.steps[place.block] += 1;
         tally.ratio.add(place.block, state.ratio);
-        tally.log.add(place.block, state.log);
+        tally.log.add(place.block, state.log());
         if tally.until_trace == 0 {
             tally.until_trace = self.plan.trace_strides[rung];
-            tally.trace.push(state.log as f32);
+            tally.trace.push(state.log() as f32);
         }
         tally.until_trace -= 1;
         if tally.until_carried == 0 {

@@ -4,7 +4,7 @@
 
 use super::super::chains::{ChainReport, RegionReport};
 use super::super::photon_settings::{LadderPlan, PhotonSettings, RegionKind};
-use super::{Eye, Glossy, IterationStats, Radius, Sppm};
+use super::{Counts, Eye, Glossy, IterationStats, Radius, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
@@ -12,7 +12,7 @@ use crate::samplers::{Ladder, PhotonSampler};
 use crate::targets::aim::{Aimer, Place, Rung};
 use crate::targets::aimed::AimedPaths;
 use crate::targets::deposits::{Deposits, collect, halves};
-use crate::targets::points::{MeasurementPoint, Points};
+use crate::targets::points::{MeasurementPoint, PointGrid, Points};
 use crate::targets::regions::Regions;
 use crate::targets::tallies::Tallies;
 use crate::transport::walk::Tally;
@@ -79,16 +79,17 @@ impl Aimed {
     }
 
     /// An iteration: camera subpaths first, then light paths aimed at what they found.
-    pub(super) fn iterate(&mut self, sppm: &Sppm<'_>, i: u64, film: &mut Film, stats: &mut IterationStats) -> Glossy {
-        let (mut values, mut points, glossy) = look(sppm, sppm.radius_at(i), i, stats);
+    pub(super) fn iterate(&mut self, sppm: &Sppm<'_>, i: u64, film: &mut Film, stats: &mut IterationStats) -> Counts {
+        let (mut values, measured, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
-        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, points.all()));
-        let (aims, new) = aimer.aim(points.all(), shrink(i, sppm.settings.alpha));
+        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, &measured));
+        let shrink = shrink(i, sppm.settings.alpha);
+        let (grid, (aims, new)) = rayon::join(|| PointGrid::build(&measured), || aimer.aim(&measured, shrink));
         if new {
             self.ladder.retargeted();
         }
-        points.set_aims(aims.iter().copied());
+        let points = Points::new(measured, grid, &aims, sppm.eye.depths(), sppm.eye.threshold);
         let light = sppm.light_paths();
         let tallies = Tallies::default();
         let space = AimedPaths { light, cells: aimer.cells(), points: &points, rungs: &self.rungs, tallies: &tallies };
@@ -121,7 +122,7 @@ impl Aimed {
         let width = sppm.eye.size.0;
         let sample = |tally: &mut Tally, x: usize, y: usize| tally.finite(values[y * width + x]);
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
-        glossy
+        Counts { deposits: draw.batches.iter().map(Deposits::count).sum(), glossy }
     }
 
     /// The ladder's diagnostics and the number of regions.
@@ -137,7 +138,7 @@ impl Aimed {
 }
 
 /// Camera subpaths of an iteration: emission per pixel, and the measurement points in pixel order.
-fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats) -> (Vec<Rgb>, Points<'a>, Glossy) {
+fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats) -> (Vec<Rgb>, Vec<MeasurementPoint<'a>>, Glossy) {
     let (eye, width) = (&sppm.eye, sppm.eye.size.0);
     let row = |y: usize| {
         let (mut tally, mut glossy) = (Tally::default(), Glossy::default());
@@ -150,7 +151,7 @@ fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats)
         }
         (emission, points, tally, glossy)
     };
-    let rows: Vec<_> = (0..eye.size.1).into_par_iter().map(row).collect();
+    let rows: Vec<_> = (0..eye.size.1).into_par_iter().with_max_len(1).map(row).collect();
     let (mut values, mut points, mut all) = (Vec::with_capacity(eye.pixels()), Vec::with_capacity(eye.pixels()), Glossy::default());
     for (emission, found, tally, glossy) in rows {
         values.extend(emission);
@@ -158,7 +159,7 @@ fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats)
         stats.count(&tally);
         all.add(&glossy);
     }
-    (values, Points::new(points, eye.depths(), eye.threshold), all)
+    (values, points, all)
 }
 
 /// Measurement points, some a pixel.
@@ -170,7 +171,7 @@ fn pilot<'a>(eye: &Eye<'a>, radius: Radius, stats: &mut IterationStats) -> Vec<M
         let found: Vec<_> = samples.filter_map(|(pixel, number)| eye.pilot(number, pixel, radius, &mut tally)).collect();
         (found, tally)
     };
-    let rows: Vec<_> = (0..eye.size.1).into_par_iter().map(row).collect();
+    let rows: Vec<_> = (0..eye.size.1).into_par_iter().with_max_len(1).map(row).collect();
     stats.camera_paths += PILOT * eye.pixels() as u64;
     let mut points = Vec::new();
     for (found, tally) in rows {
@@ -187,6 +188,7 @@ mod tests {
     use crate::samplers::{Key, LightPathSpace, Purpose};
     use crate::scene::Scene;
     use crate::scene::mitsuba::{LoadOptions, load};
+    use crate::targets::aim::Aim;
     use crate::targets::cells::CellSearch;
     use crate::targets::points::{Search, Touch};
     use std::path::Path;
@@ -196,7 +198,12 @@ mod tests {
     fn sppm(scene: &Scene, max_depth: u32) -> Sppm<'_> {
         let common = Common { seed: 0, max_depth: Some(max_depth), min_depth: 1, rr_depth: 5, hide_emitters: false, paths: None };
         let eye = Eye { scene, common, size: SIZE, threshold: 0.05 };
-        Sppm { eye, settings: PhotonSettings::default(), photon_count: 1, cell: 1.0, aimed: None, glossy: Glossy::default() }
+        Sppm { eye, settings: PhotonSettings::default(), photon_count: 1, cell: 1.0, aimed: None, counts: Counts::default() }
+    }
+
+    fn indexed<'a>(sppm: &Sppm<'a>, measured: Vec<MeasurementPoint<'a>>) -> Points<'a> {
+        let (grid, aims) = (PointGrid::build(&measured), vec![Aim::default(); measured.len()]);
+        Points::new(measured, grid, &aims, sppm.eye.depths(), sppm.eye.threshold)
     }
 
     /// Light paths of a scene, with the number of points that they add light to, and of vertices that cells admit.
@@ -224,9 +231,10 @@ mod tests {
             let options = LoadOptions { resolution: Some((SIZE.0 as u32, SIZE.1 as u32)), ..Default::default() };
             let loaded = load(&file, &options).unwrap();
             let sppm = sppm(&loaded.scene, max_depth);
-            let (_, points, _) = look(&sppm, sppm.radius_at(0), 0, &mut IterationStats::default());
+            let (_, measured, _) = look(&sppm, sppm.radius_at(0), 0, &mut IterationStats::default());
             let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &[]);
-            assert!(aimer.trial() && aimer.aim(points.all(), 1.0).1);
+            assert!(aimer.trial() && aimer.aim(&measured, 1.0).1);
+            let points = indexed(&sppm, measured);
             let paths = paths(&sppm, &aimer, &points);
             let missed = paths.iter().filter(|(touches, reached)| *touches > 0 && *reached == 0).count();
             let touching = paths.iter().filter(|(touches, _)| *touches > 0).count();
@@ -246,9 +254,10 @@ mod tests {
         let mut stats = IterationStats::default();
         let pilot = pilot(&sppm.eye, sppm.radius_at(0), &mut stats);
         let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &pilot);
-        let (_, points, _) = look(&sppm, sppm.radius_at(0), 0, &mut stats);
-        aimer.aim(points.all(), 1.0);
-        let (_, points, _) = look(&sppm, sppm.radius_at(1), 1, &mut stats);
+        let (_, measured, _) = look(&sppm, sppm.radius_at(0), 0, &mut stats);
+        aimer.aim(&measured, 1.0);
+        let (_, measured, _) = look(&sppm, sppm.radius_at(1), 1, &mut stats);
+        let points = indexed(&sppm, measured);
         let paths = paths(&sppm, &aimer, &points);
         let missed = paths.iter().filter(|(touches, reached)| *touches > 0 && *reached == 0).count();
         let touching = paths.iter().filter(|(touches, _)| *touches > 0).count();

@@ -1,6 +1,6 @@
 //! Independent light paths: photons into a grid, then each measurement point gathers and is gone.
 
-use super::{Glossy, IterationStats, Sppm};
+use super::{Counts, IterationStats, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::grid::{Photon, PhotonGrid};
@@ -13,19 +13,20 @@ use crate::transport::walk::Tally;
 
 impl Sppm<'_> {
     /// An iteration; it depends on its index, settings and seed alone.
-    pub(super) fn iterate_uniform(&self, i: u64, film: &mut Film, stats: &mut IterationStats) -> Glossy {
+    pub(super) fn iterate_uniform(&self, i: u64, film: &mut Film, stats: &mut IterationStats) -> Counts {
         let (grid, scales) = self.shoot(i, stats);
         let radius = self.radius_at(i);
         let width = self.eye.size.0;
-        let sample = |(tally, glossy): &mut (Tally, Glossy), x: usize, y: usize| {
+        let sample = |(tally, counts): &mut (Tally, Counts), x: usize, y: usize| {
             let seen = self.eye.sample(i, y * width + x, radius, tally);
-            glossy.see(&seen);
-            tally.finite(self.emission(&seen) + seen.measured.map_or(Rgb::BLACK, |m| self.gather(&m, &grid, &scales)))
+            counts.glossy.see(&seen);
+            let gathered = seen.measured.as_ref().map_or(Rgb::BLACK, |m| self.gather(m, &grid, &scales, &mut counts.deposits));
+            tally.finite(self.emission(&seen) + gathered)
         };
-        let mut all = Glossy::default();
-        film.add_eye_samples(Default::default, sample, |(tally, glossy): (Tally, Glossy)| {
+        let mut all = Counts::default();
+        film.add_eye_samples(Default::default, sample, |(tally, counts): (Tally, Counts)| {
             stats.count(&tally);
-            all.add(&glossy);
+            all.add(&counts);
         });
         all
     }
@@ -59,14 +60,15 @@ impl Sppm<'_> {
         (PhotonGrid::build(photons, cell), draw.scales)
     }
 
-    /// Flux density around a measurement point, strata scaled, times throughput and BSDF.
-    fn gather(&self, at: &MeasurementPoint<'_>, grid: &PhotonGrid, scales: &[f64]) -> Rgb {
+    /// Flux density around a measurement point, strata scaled, times throughput and BSDF. Counts the photons it takes.
+    fn gather(&self, at: &MeasurementPoint<'_>, grid: &PhotonGrid, scales: &[f64], taken: &mut u64) -> Rgb {
         let mut sum = Rgb::BLACK;
         let depths = self.eye.depths();
         let (n_g, n_s) = (at.point.end.n_g, at.point.frame.n);
         grid.query(at.point.end.p, at.radius, |photon, _| {
             let depth = at.depth + u32::from(photon.depth);
             if depth <= depths.max && depth >= depths.min && accepts(n_g, n_s, photon.n_g, photon.wi) {
+                *taken += 1;
                 let scale = scales[usize::from(photon.stratum)] as f32;
                 sum += merge(&at.point, photon.wi, self.eye.threshold) * photon.flux * scale;
             }

@@ -2,6 +2,7 @@
 
 use crate::math::fetch;
 use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 use wide::f32x8;
 
 /// Eight balls of a bucket's list, component by component. A place that is not taken holds no point.
@@ -36,12 +37,26 @@ const LEVELS: u32 = 24;
 pub(super) struct DiskGrid {
     /// Widest cells first.
     levels: Vec<Level>,
-    /// Bucket `b` holds `groups[starts[b]..starts[b + 1]]`.
-    starts: Vec<u32>,
-    groups: Vec<Group>,
+    /// Runs of buckets that are filled side by side.
+    parts: Vec<Part>,
+    /// Binary logarithm of the buckets a part.
+    part_bits: u32,
     /// Levels present in each bucket of the widest cells.
     present: Vec<u32>,
 }
+
+/// A run of buckets.
+#[derive(Debug, Default)]
+struct Part {
+    /// Its bucket `b` holds `groups[starts[b]..starts[b + 1]]`.
+    starts: Vec<u32>,
+    groups: Vec<Group>,
+}
+
+/// Binary logarithm of the number of parts, whatever the number of threads.
+const PART_BITS: u32 = 6;
+/// Balls that one task sorts into parts.
+const CHUNK: usize = 4096;
 
 /// Cells of one size. Levels have buckets of their own: a ball lies in several buckets of its level, and in one list that a query reads.
 #[derive(Clone, Copy, Debug)]
@@ -63,16 +78,15 @@ impl Level {
 
 impl DiskGrid {
     /// Sorts balls, given by centre and radius (positive, world units), into cells. Fewer than 2^28 of them.
-    pub(super) fn build(balls: impl ExactSizeIterator<Item = (Vec3, f32)> + Clone) -> Self {
-        let count = balls.len();
-        let widest = balls.clone().map(|(_, r)| r).fold(0.0, f32::max);
-        let narrowest = balls.clone().map(|(_, r)| r).fold(f32::INFINITY, f32::min);
-        let level_count = if count == 0 { 0 } else { ((widest / narrowest).log2().floor() as u32 + 1).clamp(1, LEVELS) };
+    pub(super) fn build(balls: &[(Vec3, f32)]) -> Self {
+        let widest = balls.iter().map(|(_, r)| *r).fold(0.0, f32::max);
+        let narrowest = balls.iter().map(|(_, r)| *r).fold(f32::INFINITY, f32::min);
+        let level_count = if balls.is_empty() { 0 } else { ((widest / narrowest).log2().floor() as u32 + 1).clamp(1, LEVELS) };
         let level_of = |r: f32| ((widest / r).log2().floor() as u32).min(level_count - 1) as usize;
 
         // Four buckets a ball, in each level.
         let mut of_level = vec![0usize; level_count as usize];
-        balls.clone().for_each(|(_, r)| of_level[level_of(r)] += 1);
+        balls.iter().for_each(|(_, r)| of_level[level_of(*r)] += 1);
         let mut buckets = 0;
         let level = |(level, balls): (usize, &usize)| {
             let size = (4 * balls).next_power_of_two();
@@ -81,33 +95,38 @@ impl DiskGrid {
             Level { inverse_cell: 0.5 * (level as f32).exp2() / widest, first: first as u32, mask: (size - 1) as u32 }
         };
         let levels: Vec<Level> = of_level.iter().enumerate().map(level).collect();
+        let part_bits = buckets.next_power_of_two().ilog2().saturating_sub(PART_BITS);
 
-        let mut starts = vec![0u32; buckets + 1];
-        let mut present = vec![0u32; count.max(1).next_power_of_two()];
-        let all = Level { inverse_cell: levels.first().map_or(1.0, |level| level.inverse_cell), first: 0, mask: present.len() as u32 - 1 };
-        for (p, r) in balls.clone() {
-            let level = level_of(r);
-            cells(p, r, &levels[level], |bucket| starts[bucket as usize + 1] += 1);
-            cells(p, r, &all, |bucket| present[bucket as usize] |= 1 << level);
-        }
-        // From balls a bucket to the first group of each.
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += start.div_ceil(LANES as u32);
-            *start = sum;
-        }
-        let mut taken = vec![0u32; buckets];
-        let mut groups = vec![Group::default(); sum as usize];
-        for (index, (p, r)) in balls.enumerate() {
-            cells(p, r, &levels[level_of(r)], |bucket| {
-                let place = taken[bucket as usize] as usize;
-                taken[bucket as usize] += 1;
-                let (group, lane) = (&mut groups[starts[bucket as usize] as usize + place / LANES], place % LANES);
-                (group.x[lane], group.y[lane], group.z[lane]) = (p.x, p.y, p.z);
-                (group.radius2[lane], group.index[lane]) = (r * r, index as u32);
-            });
-        }
-        Self { levels, starts, groups, present }
+        // Which ball lies in which bucket, sorted into parts.
+        let coarse = balls.len().max(1).next_power_of_two();
+        let coarse_bits = coarse.ilog2().saturating_sub(PART_BITS);
+        let all = Level { inverse_cell: levels.first().map_or(1.0, |level| level.inverse_cell), first: 0, mask: coarse as u32 - 1 };
+        let sort = |(chunk, balls): (usize, &[(Vec3, f32)])| {
+            let (mut lists, mut present) = (vec![Vec::new(); 1 << PART_BITS], vec![Vec::new(); 1 << PART_BITS]);
+            for (index, &(p, r)) in (chunk * CHUNK..).zip(balls) {
+                let level = level_of(r);
+                cells(p, r, &levels[level], |bucket| lists[(bucket >> part_bits) as usize].push((bucket, index as u32)));
+                cells(p, r, &all, |bucket| present[(bucket >> coarse_bits) as usize].push((bucket, 1 << level)));
+            }
+            (lists, present)
+        };
+        let chunks: Vec<(Lists, Lists)> = balls.par_chunks(CHUNK).enumerate().map(sort).collect();
+
+        let part = |part: usize| Part::build(1 << part_bits, balls, || chunks.iter().flat_map(move |(lists, _)| &lists[part]));
+        let parts = (0..1 << PART_BITS).into_par_iter().map(part).collect();
+        let mut present = vec![0u32; coarse];
+        present.par_chunks_mut(1 << coarse_bits).enumerate().for_each(|(part, present)| {
+            for &(bucket, level) in chunks.iter().flat_map(|(_, lists)| &lists[part]) {
+                present[bucket as usize & ((1 << coarse_bits) - 1)] |= level;
+            }
+        });
+        Self { levels, parts, part_bits, present }
+    }
+
+    /// The part of a bucket, and the bucket's number in it.
+    #[inline(always)]
+    fn part(&self, bucket: u32) -> (&Part, usize) {
+        (&self.parts[(bucket >> self.part_bits) as usize], (bucket & ((1 << self.part_bits) - 1)) as usize)
     }
 
     /// Calls `visit` with the number of a place and of a ball that holds it, for all of them, places in order. `scratch` is memory.
@@ -136,12 +155,14 @@ impl DiskGrid {
                 let level = &self.levels[levels.trailing_zeros() as usize];
                 levels &= levels - 1;
                 let bucket = level.bucket(cell_of(p, level.inverse_cell));
-                fetch(&self.starts[bucket as usize]);
+                let (part, local) = self.part(bucket);
+                fetch(&part.starts[local]);
                 scratch.push(Lookup { place, p, bucket });
             }
         }
         for lookup in &scratch[count..] {
-            if let Some(group) = self.groups.get(self.starts[lookup.bucket as usize] as usize) {
+            let (part, bucket) = self.part(lookup.bucket);
+            if let Some(group) = part.groups.get(part.starts[bucket] as usize) {
                 // A group lies in three cache lines.
                 fetch(&group.x);
                 fetch(&group.z);
@@ -150,7 +171,8 @@ impl DiskGrid {
         }
         for &Lookup { place, p, bucket } in &scratch[count..] {
             let splat = [p.x, p.y, p.z].map(f32x8::splat);
-            for group in &self.groups[self.starts[bucket as usize] as usize..self.starts[bucket as usize + 1] as usize] {
+            let (part, bucket) = self.part(bucket);
+            for group in &part.groups[part.starts[bucket] as usize..part.starts[bucket + 1] as usize] {
                 let mut held = group.holding(splat);
                 while held != 0 {
                     visit(place, group.index[held.trailing_zeros() as usize]);
@@ -158,6 +180,35 @@ impl DiskGrid {
                 }
             }
         }
+    }
+}
+
+/// Buckets and what lies in them, by part.
+type Lists = Vec<Vec<(u32, u32)>>;
+
+impl Part {
+    /// Of `buckets` buckets, a power of two. `entries` are pairs of a bucket's number and a ball's, balls ascending.
+    fn build<'a, E: Iterator<Item = &'a (u32, u32)>>(buckets: usize, balls: &[(Vec3, f32)], entries: impl Fn() -> E) -> Self {
+        let local = |bucket: u32| bucket as usize & (buckets - 1);
+        let mut starts = vec![0u32; buckets + 1];
+        entries().for_each(|(bucket, _)| starts[local(*bucket) + 1] += 1);
+        // From balls a bucket to the first group of each.
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += start.div_ceil(LANES as u32);
+            *start = sum;
+        }
+        let mut taken = vec![0u32; buckets];
+        let mut groups = vec![Group::default(); sum as usize];
+        for &(bucket, index) in entries() {
+            let (bucket, (p, r)) = (local(bucket), balls[index as usize]);
+            let place = taken[bucket] as usize;
+            taken[bucket] += 1;
+            let (group, lane) = (&mut groups[starts[bucket] as usize + place / LANES], place % LANES);
+            (group.x[lane], group.y[lane], group.z[lane]) = (p.x, p.y, p.z);
+            (group.radius2[lane], group.index[lane]) = (r * r, index);
+        }
+        Self { starts, groups }
     }
 }
 
@@ -216,7 +267,7 @@ mod tests {
         // Radii over a range of 1, of 50, and of 1e9, wider than the levels.
         for (scale, spread) in [(1.0f32, 0.0f32), (1e3, 4.0), (1e-3, 21.0)] {
             let balls: Vec<(Vec3, f32)> = (0..3000).map(|i| (point(scale), 0.05 * scale * (-spread * (i as f32 / 3000.0)).exp())).collect();
-            let grid = DiskGrid::build(balls.iter().copied());
+            let grid = DiskGrid::build(&balls);
             let (mut found_any, mut scratch) = (0, Vec::new());
             for i in 0..2000 {
                 // Near the balls' centres too, or the small ones are never met.
@@ -237,7 +288,7 @@ mod tests {
 
     #[test]
     fn an_empty_grid_answers_nothing() {
-        let grid = DiskGrid::build(std::iter::empty::<(Vec3, f32)>());
+        let grid = DiskGrid::build(&[]);
         grid.containing(std::iter::once(Vec3::ZERO), &mut Vec::new(), |_, _| panic!("found something"));
     }
 }

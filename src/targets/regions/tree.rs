@@ -8,6 +8,9 @@ pub(super) const DEPTH: u32 = 15;
 /// Fewest pilot points in a leaf: four pixels' worth. Smaller regions would meet no measurement point in most iterations.
 const LEAF_POINTS: usize = 16;
 
+/// Fewest points on a side for a task of its own.
+const TASK_POINTS: usize = 4096;
+
 #[derive(Clone, Copy, Debug)]
 struct Node {
     parent: u32,
@@ -31,35 +34,56 @@ pub(super) struct Tree {
 impl Tree {
     /// Median splits of the longest side of the points' box.
     pub(super) fn median(mut points: Vec<Vec3>) -> Self {
-        let mut tree = Self { nodes: vec![Node { parent: 0, kind: Kind::Leaf(0) }], leaves: Vec::new() };
-        tree.split_points(0, &mut points, DEPTH);
-        tree
+        Self::of_points(&mut points, DEPTH)
     }
 
-    fn split_points(&mut self, node: u32, points: &mut [Vec3], depth: u32) {
+    fn of_points(points: &mut [Vec3], depth: u32) -> Self {
+        let mut tree = Self::only_root();
         let low = points.iter().copied().fold(Vec3::INFINITY, Vec3::min);
         let extent = points.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max) - low;
         let axis = if extent.x >= extent.y && extent.x >= extent.z { 0 } else { 1 + usize::from(extent.z > extent.y) };
         // Points all in one place cannot be told apart by a plane.
         if depth == 0 || points.len() < 2 * LEAF_POINTS || extent[axis] <= 0.0 {
-            return self.close(node);
+            tree.close(0);
+            return tree;
         }
         let middle = points.len() / 2;
         let at = points.select_nth_unstable_by(middle, |a, b| a[axis].total_cmp(&b[axis])).1[axis];
         // What equals the plane goes left, as `leaf` asks.
         let left = partition(points, |p| p[axis] <= at);
         if left == points.len() {
-            return self.close(node);
+            tree.close(0);
+            return tree;
         }
-        let first = self.open(node, axis as u8, at);
         let (below, above) = points.split_at_mut(left);
-        self.split_points(first, below, depth - 1);
-        self.split_points(first + 1, above, depth - 1);
+        let of = |points| Self::of_points(points, depth - 1);
+        let (below, above) = if middle < TASK_POINTS { (of(below), of(above)) } else { rayon::join(|| of(below), || of(above)) };
+        let first = tree.open(0, axis as u8, at);
+        tree.graft(first, &below);
+        tree.graft(first + 1, &above);
+        tree
+    }
+
+    fn only_root() -> Self {
+        Self { nodes: vec![Node { parent: 0, kind: Kind::Leaf(0) }], leaves: Vec::new() }
+    }
+
+    /// A leaf that is no leaf yet becomes the other tree.
+    fn graft(&mut self, place: u32, other: &Tree) {
+        let (nodes, leaves) = (self.nodes.len() as u32, self.leaves.len() as u32);
+        let number = |node: u32| if node == 0 { place } else { nodes + node - 1 };
+        let kind = |kind| match kind {
+            Kind::Split { first, axis, at } => Kind::Split { first: number(first), axis, at },
+            Kind::Leaf(leaf) => Kind::Leaf(leaves + leaf),
+        };
+        self.nodes[place as usize].kind = kind(other.nodes[0].kind);
+        self.nodes.extend(other.nodes[1..].iter().map(|node| Node { parent: number(node.parent), kind: kind(node.kind) }));
+        self.leaves.extend(other.leaves.iter().map(|node| number(*node)));
     }
 
     /// Halves of the longer side of an image.
     pub(super) fn halves(width: usize, height: usize) -> Self {
-        let mut tree = Self { nodes: vec![Node { parent: 0, kind: Kind::Leaf(0) }], leaves: Vec::new() };
+        let mut tree = Self::only_root();
         tree.split_pixels(0, [0, 0], [width, height], DEPTH);
         tree
     }
