@@ -248,7 +248,7 @@ impl PhotonSampler for Ladder {
             let steps = count / ensembles + u64::from(e < count % ensembles);
             ensemble::run(space, &plan, e, (first, steps), chains, start(), &emit)
         };
-        let outcomes: Vec<Outcome<A>> = self.chains.par_iter_mut().enumerate().map(run).collect();
+        let outcomes: Vec<Outcome<A>> = self.chains.par_iter_mut().enumerate().with_max_len(1).map(run).collect();
         let mut batches = Vec::with_capacity(outcomes.len());
         let mut tallies = Vec::with_capacity(outcomes.len());
         for outcome in outcomes {

@@ -118,7 +118,8 @@ impl PhotonSampler for Uniform {
         A: Send,
     {
         let seed = self.seed;
-        let batch = |b: u64| {
+        let batch = |b: usize| {
+            let b = b as u64;
             let mut accumulator = start();
             let mut path = P::Path::default();
             for index in b * BATCH..count.min((b + 1) * BATCH) {
@@ -128,7 +129,8 @@ impl PhotonSampler for Uniform {
             }
             accumulator
         };
-        let batches = (0..count.div_ceil(BATCH)).into_par_iter().map(batch).collect();
+        // One batch a task: runs of several leave a thread idle at the end.
+        let batches = (0..count.div_ceil(BATCH) as usize).into_par_iter().with_max_len(1).map(batch).collect();
         Draw { batches, scales: vec![1.0 / count.max(1) as f64], traced: count }
     }
 }

@@ -85,7 +85,7 @@ impl Carried {
             };
             states.map(of_state).collect::<Vec<f64>>()
         };
-        let worths: Vec<Vec<f64>> = (0..self.states.len().div_ceil(BATCH)).into_par_iter().map(worth).collect();
+        let worths: Vec<Vec<f64>> = (0..self.states.len().div_ceil(BATCH)).into_par_iter().with_max_len(1).map(worth).collect();
         let worths = worths.concat();
         let offset = f64::from(key(0).stream().next_1d());
         let starts = evenly(&worths, offset, chains.len());

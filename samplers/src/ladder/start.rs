@@ -35,7 +35,8 @@ struct Seen {
 
 /// Traces `paths` independent paths of an iteration. `measured` asks for usefulness as well.
 pub(super) fn pool<P: LightPathSpace>(space: &P, (seed, iteration): (u64, u64), rungs: usize, paths: u64, measured: bool) -> Pool {
-    let batch = |batch: u64| {
+    let batch = |batch: usize| {
+        let batch = batch as u64;
         let mut pool = Pool { rungs, paths: 0, visible: Vec::new(), values: Vec::new(), rest: (0.0, 0.0) };
         let mut path = P::Path::default();
         let mut made = Vec::new();
@@ -56,7 +57,7 @@ pub(super) fn pool<P: LightPathSpace>(space: &P, (seed, iteration): (u64, u64), 
         }
         pool
     };
-    let batches: Vec<Pool> = (0..paths.div_ceil(BATCH)).into_par_iter().map(batch).collect();
+    let batches: Vec<Pool> = (0..paths.div_ceil(BATCH) as usize).into_par_iter().with_max_len(1).map(batch).collect();
     let mut all = Pool { rungs, paths, visible: Vec::new(), values: Vec::new(), rest: (0.0, 0.0) };
     for batch in batches {
         all.visible.extend(batch.visible);

@@ -110,10 +110,10 @@ impl DiskGrid {
             }
             (lists, present)
         };
-        let chunks: Vec<(Lists, Lists)> = balls.par_chunks(CHUNK).enumerate().map(sort).collect();
+        let chunks: Vec<(Lists, Lists)> = balls.par_chunks(CHUNK).enumerate().with_max_len(1).map(sort).collect();
 
         let part = |part: usize| Part::build(1 << part_bits, balls, || chunks.iter().flat_map(move |(lists, _)| &lists[part]));
-        let parts = (0..1 << PART_BITS).into_par_iter().map(part).collect();
+        let parts = (0..1 << PART_BITS).into_par_iter().with_max_len(1).map(part).collect();
         let mut present = vec![0u32; coarse];
         present.par_chunks_mut(1 << coarse_bits).enumerate().for_each(|(part, present)| {
             for &(bucket, level) in chunks.iter().flat_map(|(_, lists)| &lists[part]) {
