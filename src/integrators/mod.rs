@@ -160,4 +160,5 @@ pub const METHODS: &[Method] = &[
     method::<path::PathSettings>("path", "Path tracing with next event estimation", "methods/path.md"),
     method::<vcm::BdptSettings>("bdpt", "Bidirectional path tracing", "methods/vcm.md"),
     method::<sppm::SppmSettings>("sppm", "Stochastic progressive photon mapping", "methods/sppm.md"),
+    method::<vcm::VcmSettings>("vcm", "Vertex connection and merging", "methods/vcm.md"),
 ];

@@ -1,67 +1,32 @@
 //! Vertex connection and merging: one engine for every set of techniques, \[VCM-TR\], [THESIS 2.4].
 //!
-//! An iteration traces light subpaths and keeps their vertices; connects each vertex to the camera; then traces one camera subpath a pixel, which
-//! hits emitters, samples lights, and is connected to the vertices of one light subpath. Weights are those of `transport::mis`.
+//! An iteration traces light subpaths, connects their vertices to the camera and keeps them; then it traces one camera subpath a pixel, which
+//! hits emitters, samples lights, is connected to the vertices of one light subpath, and merges with those of all that lie near. Weights are
+//! those of `transport::mis`.
 
 mod eye;
 mod iteration;
 mod light;
+mod settings;
 mod technique;
 
-use super::photon_settings::SamplerName;
-use super::{Common, Integrator, IterationStats, MethodError, Settings};
+use super::photon_settings::PhotonSettings;
+use super::sppm::eye::Eye;
+use super::{Common, Integrator, IterationStats, MethodError};
 use crate::image::film::Film;
+use crate::photons::Grid;
+use crate::photons::radius::shrink;
 use crate::samplers::{PhotonSampler, Uniform};
 use crate::scene::Scene;
 use crate::targets::points::DepthRange;
 use crate::transport::mis::{Heuristic, Sampling, Techniques, Weights};
 use crate::transport::subpath::Subpaths;
 use crate::transport::walk::Tally;
-use clap::Args;
 use iteration::Iteration;
-use light::{Batch, LightSide};
-use serde::{Deserialize, Serialize};
+use light::{Batch, LightSide, Merging};
 
+pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
 pub use technique::{Technique, TechniqueName};
-
-/// Settings of `bdpt`: the engine without merges.
-#[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct BdptSettings {
-    /// Photon sampler
-    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
-    pub sampler: SamplerName,
-    /// Light paths per iteration; default one a pixel
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub photons: Option<u64>,
-    /// One technique, with weight 1: for tests.
-    #[arg(long, hide = true)]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub alone: Option<Technique>,
-}
-
-impl Settings for BdptSettings {
-    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
-        if self.sampler != SamplerName::Uniform {
-            let message = "only --sampler uniform draws light paths for connections as yet".into();
-            return Err(MethodError::Settings { method: "bdpt", message });
-        }
-        if self.photons == Some(0) {
-            return Err(MethodError::Settings { method: "bdpt", message: "--photons must be at least 1".into() });
-        }
-        Ok(Box::new(Engine {
-            scene,
-            common: common.clone(),
-            size,
-            techniques: Techniques::BDPT,
-            heuristic: Heuristic::default(),
-            photon_count: self.photons.unwrap_or((size.0 * size.1) as u64),
-            roughness_threshold: 0.0,
-            alone: self.alone,
-        }))
-    }
-}
 
 /// The engine bound to a scene.
 struct Engine<'a> {
@@ -70,20 +35,62 @@ struct Engine<'a> {
     size: (usize, usize),
     techniques: Techniques,
     heuristic: Heuristic,
-    photon_count: u64,
-    roughness_threshold: f32,
+    photons: PhotonSettings,
+    /// Radius of iteration 0, world units; what it is without merges means nothing.
+    radius: f64,
     alone: Option<Technique>,
 }
 
-impl Engine<'_> {
-    fn depths(&self) -> DepthRange {
-        DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) }
+impl<'a> Engine<'a> {
+    fn new(
+        scene: &'a Scene,
+        size: (usize, usize),
+        common: &Common,
+        techniques: Techniques,
+        heuristic: Heuristic,
+        photons: PhotonSettings,
+        alone: Option<Technique>,
+    ) -> Self {
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, alone }
+    }
+
+    /// Roughness from which a surface merges.
+    fn threshold(&self) -> f32 {
+        self.photons.roughness_threshold.unwrap_or(0.0)
+    }
+
+    fn sampling(&self, i: u64) -> Sampling {
+        let radius = self.radius * shrink(i, self.photons.alpha);
+        let light_paths = self.photons.photon_count(self.size) as f64;
+        Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
+    }
+
+    /// Iteration `i`, whose weights are made ready.
+    fn iteration<'w>(&'w self, i: u64, sampling: &Sampling, weights: &'w Weights<f32>) -> Iteration<'a, 'w> {
+        let subpaths = Subpaths {
+            scene: self.scene,
+            weights,
+            roughness_threshold: self.threshold(),
+            photons: None,
+            classes: self.common.paths.is_some(),
+        };
+        Iteration {
+            subpaths,
+            techniques: self.techniques,
+            common: &self.common,
+            index: i,
+            size: self.size,
+            depths: DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) },
+            radius: sampling.radius as f32,
+            merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
+            alone: self.alone,
+        }
     }
 
     /// Light subpaths of an iteration, their splats in the film.
     fn shoot(&self, iteration: &Iteration<'_, '_>, film: &mut Film, stats: &mut IterationStats) -> LightSide {
         // A path of one edge is a light seen directly, and left to the camera's side.
-        let count = if iteration.depths.max > 1 { self.photon_count } else { 0 };
+        let count = if iteration.depths.max > 1 { self.photons.photon_count(self.size) } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn| iteration.keep(batch, path, drawn);
         let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
@@ -98,33 +105,34 @@ impl Engine<'_> {
 
 impl Integrator for Engine<'_> {
     fn prepare(&mut self) -> Result<IterationStats, MethodError> {
-        Ok(IterationStats::default())
+        let mut stats = IterationStats::default();
+        if self.techniques.merges {
+            self.radius = match self.photons.radius {
+                Some(radius) => radius,
+                None => {
+                    let eye = Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() };
+                    // Where no pixel's centre shows a surface that merges, hardly any subpath will find one.
+                    let footprint = eye.median_footprint(&mut stats).unwrap_or(1e-3 * self.scene.bounding_sphere().1.max(1e-3));
+                    self.photons.radius_pixels.unwrap_or(1.0) * f64::from(footprint)
+                }
+            };
+        }
+        Ok(stats)
     }
 
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
         let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
-        let sampling =
-            Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths: self.photon_count as f64, radius: 1.0 };
+        let sampling = self.sampling(i);
         let weights = Weights::new(&sampling);
-        let subpaths = Subpaths {
-            scene: self.scene,
-            weights: &weights,
-            roughness_threshold: self.roughness_threshold,
-            photons: None,
-            classes: self.common.paths.is_some(),
-        };
-        let iteration = Iteration {
-            subpaths,
-            techniques: self.techniques,
-            common: &self.common,
-            index: i,
-            size: self.size,
-            depths: self.depths(),
-            alone: self.alone,
-        };
+        let iteration = self.iteration(i, &sampling, &weights);
         let light = self.shoot(&iteration, film, &mut stats);
-        let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, tally);
+        let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
+        let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
         stats
+    }
+
+    fn radius(&self) -> Option<f64> {
+        self.techniques.merges.then_some(self.radius)
     }
 }

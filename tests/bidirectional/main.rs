@@ -101,3 +101,14 @@ fn each_connection_alone_is_the_path_tracer() {
     failures.extend(pure(POINT, "LDGDE", &["vc1", "vc2", "vc3", "lt"], 0.04, 64));
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
+
+#[test]
+#[ignore]
+fn adhoc() {
+    let light = match std::env::var("LIGHT").unwrap().as_str() { "lamp" => LAMP, "point" => POINT, _ => SPOT };
+    let class = std::env::var("CLASS").unwrap();
+    let techniques = std::env::var("TECH").unwrap();
+    let n: u64 = std::env::var("N").unwrap().parse().unwrap();
+    let list: Vec<&str> = techniques.split(',').collect();
+    eprintln!("{:?}", pure(light, &class, &list, 1.0, n));
+}

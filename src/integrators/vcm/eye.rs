@@ -1,22 +1,25 @@
 //! The camera's side: a subpath a pixel, and everything it is joined with.
 
 use super::iteration::Iteration;
-use super::light::{LightSide, LightVertex};
+use super::light::{LightSide, LightVertex, Merging};
 use super::technique::Technique;
 use crate::math::Rgb;
 use crate::samplers::{Key, Purpose, Stream};
 use crate::scene::bsdf::Mode;
+use crate::scene::emitter::DirectSample;
 use crate::scene::hit::Hit;
 use crate::transport::class::Letters;
-use crate::transport::mis::{Connector, Edge, LightEnd};
+use crate::transport::merge::{accepts, cosine_ratio};
+use crate::transport::mis::{Carried, Connector, Edge, LightEnd};
 use crate::transport::shading::SurfacePoint;
 use crate::transport::subpath::{Departure, Start, SubpathVertex};
+use crate::transport::survival::Met;
 use crate::transport::walk::{Tally, beyond_emitters};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 
 impl<'a> Iteration<'a, '_> {
     /// What a pixel's camera subpath finds.
-    pub(super) fn pixel(&self, x: usize, y: usize, light: &LightSide, tally: &mut Tally) -> Rgb {
+    pub(super) fn pixel(&self, x: usize, y: usize, light: &LightSide, merging: Option<&Merging>, tally: &mut Tally) -> Rgb {
         let number = y * self.size.0 + x;
         let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stream();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
@@ -46,6 +49,10 @@ impl<'a> Iteration<'a, '_> {
                         sum += tally.finite(found);
                     }
                 }
+                if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
+                    let found = self.merge(vertex, &point, merging);
+                    sum += tally.finite(found);
+                }
             }
             goes_on
         });
@@ -64,33 +71,35 @@ impl<'a> Iteration<'a, '_> {
 
     /// A light that was hit.
     fn hit(&self, vertex: &SubpathVertex<'a>) -> Rgb {
-        let (scene, weights) = (self.subpaths.scene, self.subpaths.weights);
-        let emitted = scene.emitted(&vertex.hit, -vertex.d, vertex.from.p);
+        let emitted = self.subpaths.scene.emitted(&vertex.hit, -vertex.d, vertex.from.p);
         if emitted.radiance.is_black() || !self.emission_counts(vertex.carried.edges, vertex.letters) {
             return Rgb::BLACK;
         }
-        let weight = match vertex.carried.edges {
-            1 => 1.0,
-            _ => LightEnd::of_hit(scene, &vertex.hit, vertex.d, &vertex.from)
-                .map_or(0.0, |end| weights.emitter_hit(&vertex.carried, &end.emission)),
-        };
-        vertex.throughput * emitted.radiance * self.weigh(Technique::Connection(0), weight)
+        vertex.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.hit_weight(vertex))
+    }
+
+    pub(super) fn hit_weight(&self, vertex: &SubpathVertex<'a>) -> f32 {
+        if vertex.carried.edges == 1 {
+            return 1.0;
+        }
+        let end = LightEnd::of_hit(self.subpaths.scene, &vertex.hit, vertex.d, &vertex.from);
+        end.map_or(0.0, |end| self.subpaths.weights.emitter_hit(&vertex.carried, &end.emission))
     }
 
     /// The light all around.
     fn escape(&self, departure: &Departure) -> Rgb {
-        let (scene, weights) = (self.subpaths.scene, self.subpaths.weights);
-        let emitted = scene.escaped(departure.d);
+        let emitted = self.subpaths.scene.escaped(departure.d);
         if emitted.radiance.is_black() || !self.emission_counts(departure.edges, departure.letters) {
             return Rgb::BLACK;
         }
-        let weight = departure.last.map_or(1.0, |(from, carried, scatter)| {
-            LightEnd::of_escape(scene, departure.d, &from).map_or(0.0, |end| {
-                let carried = weights.extend(&carried, scatter, end.edge.reversed(), 0.0);
-                weights.emitter_hit(&carried, &end.emission)
-            })
-        });
-        departure.throughput * emitted.radiance * self.weigh(Technique::Connection(0), weight)
+        departure.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.escape_weight(departure))
+    }
+
+    pub(super) fn escape_weight(&self, departure: &Departure) -> f32 {
+        let Some((from, carried, scatter)) = &departure.last else { return 1.0 };
+        let Some(end) = LightEnd::of_escape(self.subpaths.scene, departure.d, from) else { return 0.0 };
+        let weights = self.subpaths.weights;
+        weights.emitter_hit(&weights.extend(carried, *scatter, end.edge.reversed(), 0.0), &end.emission)
     }
 
     /// A light sample.
@@ -102,9 +111,8 @@ impl<'a> Iteration<'a, '_> {
         }
         let Some(sample) = scene.sample_direct(point.end.p, u_emitter, u) else { return Rgb::BLACK };
         let Some(met) = point.meet(Mode::Radiance, sample.wi) else { return Rgb::BLACK };
-        let LightEnd { emission, edge } = LightEnd::of_direct(scene, &sample, &point.end);
-        let weight = self.subpaths.weights.next_event(&vertex.carried, &emission, edge, met.fwd, met.rev);
         let cos = point.cosine(Mode::Radiance, sample.wi);
+        let weight = self.next_event_weight(&vertex.carried, point, &sample, &met);
         let factor = self.weigh(Technique::Connection(1), weight) * cos / sample.pdf.0;
         let mut value = vertex.throughput * met.f * sample.radiance * factor;
         if let Some(pattern) = &self.common.paths {
@@ -115,6 +123,11 @@ impl<'a> Iteration<'a, '_> {
         }
         tally.rays += 1;
         if scene.visible(&point.end, &sample) { value } else { Rgb::BLACK }
+    }
+
+    pub(super) fn next_event_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, sample: &DirectSample, met: &Met) -> f32 {
+        let LightEnd { emission, edge } = LightEnd::of_direct(self.subpaths.scene, sample, &point.end);
+        self.subpaths.weights.next_event(carried, &emission, edge, met.fwd, met.rev)
     }
 
     /// A connection to a light vertex.
@@ -129,20 +142,9 @@ impl<'a> Iteration<'a, '_> {
         if !self.depths.contains(vertex.carried.edges + partner.carried.edges + 1) {
             return Rgb::BLACK;
         }
-        let scene = self.subpaths.scene;
-        let between = partner.end.p - point.end.p;
-        let distance2 = between.length_squared();
-        if distance2 == 0.0 {
-            return Rgb::BLACK;
-        }
-        let w = between / distance2.sqrt();
-        let other = partner.point(scene);
-        let (Some(here), Some(there)) = (point.meet(Mode::Radiance, w), other.meet(Mode::Importance, -w)) else { return Rgb::BLACK };
-        let edge = Edge::between(w.dot(partner.end.n_g).abs(), w.dot(point.end.n_g).abs(), distance2);
-        let weight = self.subpaths.weights.connection(
-            &Connector { carried: &partner.carried, rev: there.rev, found: here.fwd * edge.back },
-            &Connector { carried: &vertex.carried, rev: here.rev, found: there.fwd * edge.ahead },
-        );
+        let other = partner.point(self.subpaths.scene);
+        let Some(Joint { w, distance2, here, there }) = Joint::new(point, &other) else { return Rgb::BLACK };
+        let weight = self.connection_weight(&vertex.carried, point, partner, &Joint { w, distance2, here, there });
         let cosines = point.cosine(Mode::Radiance, w) * other.cosine(Mode::Importance, -w);
         let factor = self.weigh(Technique::Connection(partner.carried.edges + 1), weight) * cosines / distance2;
         let mut value = vertex.throughput * here.f * there.f * partner.flux * factor;
@@ -154,6 +156,66 @@ impl<'a> Iteration<'a, '_> {
             return value;
         }
         tally.rays += 1;
-        if scene.occluded(&point.end, &partner.end) { Rgb::BLACK } else { value }
+        if self.subpaths.scene.occluded(&point.end, &partner.end) { Rgb::BLACK } else { value }
+    }
+
+    pub(super) fn connection_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, partner: &LightVertex, joint: &Joint) -> f32 {
+        let Joint { w, distance2, here, there } = joint;
+        let edge = Edge::between(w.dot(partner.end.n_g).abs(), w.dot(point.end.n_g).abs(), *distance2);
+        self.subpaths.weights.connection(
+            &Connector { carried: &partner.carried, rev: there.rev, found: here.fwd * edge.back },
+            &Connector { carried, rev: here.rev, found: there.fwd * edge.ahead },
+        )
+    }
+
+    /// Merges with the light vertices around.
+    fn merge(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        let (n_g, n_s) = (point.end.n_g, point.frame.n);
+        merging.store.query(point.end.p, self.radius, |photon, _| {
+            let carried = photon.carried();
+            if !self.depths.contains(vertex.carried.edges + carried.edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
+                return;
+            }
+            let Some(met) = point.meet(Mode::Radiance, photon.wi) else { return };
+            let weight = self.weigh(Technique::Merge(carried.edges), self.merge_weight(&vertex.carried, &carried, &met));
+            let mut value = met.f * photon.flux * (cosine_ratio(point, photon.wi) * weight);
+            if let Some(pattern) = &self.common.paths {
+                value *= self.one_event(pattern, merging.letters(photon), (point, Mode::Radiance, photon.wi), vertex.letters);
+            }
+            sum += value;
+        });
+        vertex.throughput * sum * self.merge_density
+    }
+
+    #[inline(always)]
+    pub(super) fn merge_weight(&self, camera: &Carried<f32>, light: &Carried<f32>, met: &Met) -> f32 {
+        self.subpaths.weights.merge(light, met.fwd, camera, met.rev)
+    }
+}
+
+/// Two surface points, one of a camera subpath and one of a light subpath, asked about the edge between them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Joint {
+    /// Unit direction from the camera's point to the light's.
+    w: Vec3,
+    distance2: f32,
+    /// What the camera's point says, and the light's.
+    here: Met,
+    there: Met,
+}
+
+impl Joint {
+    /// `None` where one of them does not scatter along the edge.
+    pub(super) fn new(point: &SurfacePoint<'_>, other: &SurfacePoint<'_>) -> Option<Self> {
+        let between = other.end.p - point.end.p;
+        let distance2 = between.length_squared();
+        if distance2 == 0.0 {
+            return None;
+        }
+        let w = between / distance2.sqrt();
+        let here = point.meet(Mode::Radiance, w)?;
+        let there = other.meet(Mode::Importance, -w)?;
+        Some(Self { w, distance2, here, there })
     }
 }

@@ -24,6 +24,10 @@ pub(super) struct Iteration<'a, 'w> {
     pub(super) size: (usize, usize),
     /// Path lengths that count.
     pub(super) depths: DepthRange,
+    /// Radius of merges, world units.
+    pub(super) radius: f32,
+    /// One over their area and the number of light subpaths.
+    pub(super) merge_density: f32,
     /// The one technique that counts, with weight 1; `None` for all of the set with their weights.
     pub(super) alone: Option<Technique>,
 }

@@ -4,6 +4,7 @@ use super::iteration::Iteration;
 use super::technique::Technique;
 use crate::image::film::Splat;
 use crate::math::{Frame, Rgb};
+use crate::photons::Store;
 use crate::samplers::{Draw, Drawn, Key, LightPathSpace, Purpose, Stream};
 use crate::scene::ShapeId;
 use crate::scene::bsdf::Mode;
@@ -13,6 +14,7 @@ use crate::transport::class::Letters;
 use crate::transport::mis::{Carried, Connector, LightEnd};
 use crate::transport::shading::SurfacePoint;
 use crate::transport::subpath::{Start, SubpathVertex};
+use crate::transport::survival::Met;
 use crate::transport::walk::Tally;
 use glam::{Vec2, Vec3};
 
@@ -79,8 +81,8 @@ impl LightPathSpace for Iteration<'_, '_> {
             let end = LightEnd::of_emission(scene, &emission, &hit.end);
             self.subpaths.weights.from_light(&end.emission, end.edge, share)
         };
-        // One more edge joins a vertex to the camera's side.
-        let most = self.depths.max.saturating_sub(1);
+        // One more edge joins a vertex to the camera's side; a merge vertex counts its edges in 16 bits.
+        let most = self.depths.max.saturating_sub(1).min(u32::from(u16::MAX));
         self.subpaths.walk(Mode::Importance, start, stream, tally, first, |vertex, _, _| {
             if let Some(point) = vertex.point.filter(|point| point.bsdf.max_roughness() > 0.0) {
                 vertices.push(LightVertex::new(vertex, &point));
@@ -152,6 +154,73 @@ impl LightSide {
     }
 }
 
+/// A light vertex as merges need it: 60 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MergeVertex {
+    /// Unit geometric normal.
+    pub(super) n_g: Vec3,
+    /// Unit direction towards where the light came from.
+    pub(super) wi: Vec3,
+    pub(super) flux: Rgb,
+    last: f32,
+    connections: f32,
+    merges: f32,
+    shares: f32,
+    mergeable: u16,
+    edges: u16,
+    /// Its number before sorting: where its class is.
+    place: u32,
+}
+
+impl MergeVertex {
+    fn new(vertex: &LightVertex, place: u32) -> Self {
+        let LightVertex { end, wi, flux, carried, .. } = *vertex;
+        let Carried { last, connections, merges, shares, mergeable, edges, .. } = carried;
+        // Whole numbers; walks are far shorter than these can count.
+        let (mergeable, edges) = (mergeable as u16, edges.min(u32::from(u16::MAX)) as u16);
+        Self { n_g: end.n_g, wi, flux, last, connections, merges, shares, mergeable, edges, place }
+    }
+
+    /// What its vertex carried, but for the share, which is the camera vertex's where the two merge.
+    #[inline(always)]
+    pub(super) fn carried(&self) -> Carried<f32> {
+        let Self { last, connections, merges, shares, mergeable, edges, .. } = *self;
+        Carried { last, connections, merges, share: 0.0, shares, mergeable: f32::from(mergeable), edges: u32::from(edges) }
+    }
+}
+
+/// The light vertices that camera subpaths merge with.
+pub(super) struct Merging {
+    pub(super) store: Store<MergeVertex>,
+    /// Events before each vertex, by [`MergeVertex::place`]; empty unless classes are kept.
+    letters: Vec<Letters>,
+}
+
+impl Merging {
+    /// Sorts all vertices that may merge into cells of side `cell`.
+    pub(super) fn new(light: &LightSide, cell: f32) -> Self {
+        let mut places: Vec<[u32; 2]> = Vec::new();
+        let mut letters = Vec::new();
+        for (number, batch) in light.batches.iter().enumerate() {
+            for (i, _) in batch.vertices.iter().enumerate().filter(|(_, vertex)| vertex.carried.share > 0.0) {
+                places.push([number as u32, i as u32]);
+                letters.extend(batch.letters.get(i));
+            }
+        }
+        let vertex = |i: usize| {
+            let [batch, place] = places[i].map(|n| n as usize);
+            &light.batches[batch].vertices[place]
+        };
+        let store = Store::build(places.len(), |i| vertex(i).end.p, |i| MergeVertex::new(vertex(i), i as u32), cell);
+        Self { store, letters }
+    }
+
+    /// Events before a vertex.
+    pub(super) fn letters(&self, vertex: &MergeVertex) -> Letters {
+        self.letters.get(vertex.place as usize).copied().unwrap_or_default()
+    }
+}
+
 impl Iteration<'_, '_> {
     /// Keeps a light subpath, and what it brings to the camera.
     pub(super) fn keep(&self, batch: &mut Batch, path: &LightSubpath, drawn: Drawn) {
@@ -182,9 +251,7 @@ impl Iteration<'_, '_> {
         let point = vertex.point(self.subpaths.scene);
         let met = point.meet(Mode::Importance, connection.wo)?;
         let density = connection.pdf_pixel.0 / connection.distance2;
-        let found = density * connection.wo.dot(vertex.end.n_g).abs();
-        let weight = self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found });
-        let weight = self.weigh(Technique::Splat, weight);
+        let weight = self.weigh(Technique::Splat, self.splat_weight(vertex, &connection, &met));
         if weight == 0.0 {
             return None;
         }
@@ -197,6 +264,12 @@ impl Iteration<'_, '_> {
         }
         let (x, y) = (connection.film.x as usize, connection.film.y as usize);
         Some(Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) })
+    }
+
+    /// Weight of a light vertex connected to the camera.
+    pub(super) fn splat_weight(&self, vertex: &LightVertex, connection: &CameraConnection, met: &Met) -> f32 {
+        let found = connection.pdf_pixel.0 * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
+        self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found })
     }
 
     /// Is nothing between a light vertex and the camera that the camera does not look through?
