@@ -136,3 +136,6 @@ impl Integrator for Engine<'_> {
         self.techniques.merges.then_some(self.radius)
     }
 }
+
+#[cfg(test)]
+mod tests;

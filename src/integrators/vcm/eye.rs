@@ -6,6 +6,7 @@ use super::technique::Technique;
 use crate::math::Rgb;
 use crate::samplers::{Key, Purpose, Stream};
 use crate::scene::bsdf::Mode;
+use crate::scene::camera::CameraRay;
 use crate::scene::emitter::DirectSample;
 use crate::scene::hit::Hit;
 use crate::transport::class::Letters;
@@ -29,10 +30,7 @@ impl<'a> Iteration<'a, '_> {
         if self.common.hide_emitters {
             ray = beyond_emitters(self.subpaths.scene, ray, tally).0;
         }
-        let first = |hit: &Hit, share: f32| {
-            let edge = Edge::between(1.0, ray.d.dot(hit.end.n_g).abs(), seen.end.p.distance_squared(hit.end.p));
-            self.subpaths.weights.from_camera(seen.pdf_pixel.0, edge, share)
-        };
+        let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
         let mut sum = Rgb::BLACK;
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
@@ -60,6 +58,12 @@ impl<'a> Iteration<'a, '_> {
             sum += tally.finite(self.escape(&departure));
         }
         sum
+    }
+
+    /// What the first vertex of a camera subpath carries.
+    pub(super) fn seen(&self, seen: &CameraRay, hit: &Hit, share: f32) -> Carried<f32> {
+        let edge = Edge::between(1.0, seen.ray.d.dot(hit.end.n_g).abs(), seen.end.p.distance_squared(hit.end.p));
+        self.subpaths.weights.from_camera(seen.pdf_pixel.0, edge, share)
     }
 
     /// Does emission count that is met after so many edges?
@@ -198,11 +202,11 @@ impl<'a> Iteration<'a, '_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Joint {
     /// Unit direction from the camera's point to the light's.
-    w: Vec3,
-    distance2: f32,
+    pub(super) w: Vec3,
+    pub(super) distance2: f32,
     /// What the camera's point says, and the light's.
-    here: Met,
-    there: Met,
+    pub(super) here: Met,
+    pub(super) there: Met,
 }
 
 impl Joint {

@@ -35,7 +35,7 @@ pub(super) struct LightVertex {
 }
 
 impl LightVertex {
-    fn new(vertex: &SubpathVertex<'_>, point: &SurfacePoint<'_>) -> Self {
+    pub(super) fn new(vertex: &SubpathVertex<'_>, point: &SurfacePoint<'_>) -> Self {
         let SurfacePoint { end, frame, uv, given, .. } = *point;
         let (flux, carried) = (vertex.throughput, vertex.carried);
         Self { end, n_s: frame.n, s: frame.s, uv, shape: vertex.hit.shape, wi: given, flux, carried }
