@@ -1,6 +1,8 @@
 //! Cells of space and the numbers they hash to, laid out so that neighbours share memory and never a number.
 
 use glam::{IVec3, Vec3};
+use wide::bytemuck::cast;
+use wide::{i32x8, u32x8};
 
 /// Cells of a block along an axis, as a power of two: a block's 64 buckets lie side by side.
 const BLOCK: i32 = 2;
@@ -22,9 +24,18 @@ pub(super) struct Cells {
     mask: u32,
 }
 
+/// Odd multipliers of a region's coordinates: sums of their multiples keep small offsets apart.
+const FACTORS: [u32; 3] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d];
+/// Multiplier of the sum.
+const MIX: u32 = 0x2c1b_3c6d;
+
 /// A block's share of the way to a bucket.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Block(u32);
+pub(super) struct Block {
+    first: u32,
+    /// Flips of the rows' places, by region: regions that share their buckets seldom fill the same ones with the same plane.
+    turn: u32,
+}
 
 impl Cells {
     /// Cells of side `side` (world units, positive) in at least `buckets` buckets, at most 2^31.
@@ -47,22 +58,27 @@ impl Cells {
     /// The cell of a position; far beyond 2^31 cells from the origin the last one there is.
     #[inline(always)]
     pub(super) fn of(&self, p: Vec3) -> IVec3 {
-        self.scaled(p).floor().as_ivec3()
+        Self::of_scaled(self.scaled(p))
+    }
+
+    /// The cell of a position in units of a cell's side.
+    #[inline(always)]
+    pub(super) fn of_scaled(p: Vec3) -> IVec3 {
+        p.floor().as_ivec3()
     }
 
     /// First bucket of the block that holds the cell.
     #[inline(always)]
     pub(super) fn block(&self, cell: IVec3) -> Block {
-        // Sums of odd multiples keep small offsets apart; then shifts and products until the low bits depend on every bit.
         let region = cell >> REGION;
-        let h = (region.x as u32)
-            .wrapping_mul(0x9e37_79b1)
-            .wrapping_add((region.y as u32).wrapping_mul(0x85eb_ca77))
-            .wrapping_add((region.z as u32).wrapping_mul(0xc2b2_ae3d));
-        let h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
+        let [x, y, z] = [(region.x, FACTORS[0]), (region.y, FACTORS[1]), (region.z, FACTORS[2])].map(|(c, f)| (c as u32).wrapping_mul(f));
+        let h = x.wrapping_add(y).wrapping_add(z);
+        // The low bits shall depend on every bit.
+        let h = (h ^ (h >> 15)).wrapping_mul(MIX);
         let hash = (h ^ (h >> 14)) & self.mask;
         let parity = cell >> BLOCK & 1;
-        Block((hash << 3 | (parity.x | parity.y << 1 | parity.z << 2) as u32) << (3 * BLOCK))
+        let parity = parity.x | parity.y << 1 | parity.z << 2;
+        Block { first: (hash << 3 | parity as u32) << (3 * BLOCK), turn: h >> 28 << BLOCK }
     }
 
     /// The cell's bucket. Cells along x within a block have buckets in sequence.
@@ -72,12 +88,33 @@ impl Cells {
     }
 }
 
+impl Cells {
+    /// Buckets of a cell and of the seven after it along x, y, z and their sums, x first: what [`Cells::bucket`] says of each.
+    #[inline(always)]
+    pub(super) fn buckets_of_eight(&self, cell: IVec3) -> [u32; 8] {
+        let [x, y, z] = [(cell.x, NEXT[0]), (cell.y, NEXT[1]), (cell.z, NEXT[2])].map(|(c, next)| i32x8::splat(c) + i32x8::new(next));
+        let share = |c: i32x8, factor: u32| (c >> REGION) * i32x8::splat(factor as i32);
+        let h: u32x8 = cast(share(x, FACTORS[0]) + share(y, FACTORS[1]) + share(z, FACTORS[2]));
+        let h = (h ^ (h >> 15)) * u32x8::splat(MIX);
+        let hash = (h ^ (h >> 14)) & u32x8::splat(self.mask);
+        let (one, inside) = (i32x8::splat(1), i32x8::splat((1 << BLOCK) - 1));
+        let parity = (x >> BLOCK & one) | ((y >> BLOCK & one) << 1) | ((z >> BLOCK & one) << 2);
+        let place = (x & inside) | ((y & inside) << BLOCK) | ((z & inside) << (2 * BLOCK));
+        let (parity, place): (u32x8, u32x8) = (cast(parity), cast(place));
+        let buckets: u32x8 = (((hash << 3) | parity) << (3 * BLOCK)) | (place ^ ((h >> 28) << BLOCK));
+        buckets.to_array()
+    }
+}
+
+/// Corners of a cube, coordinate by coordinate.
+const NEXT: [[i32; 8]; 3] = [[0, 1, 0, 1, 0, 1, 0, 1], [0, 0, 1, 1, 0, 0, 1, 1], [0, 0, 0, 0, 1, 1, 1, 1]];
+
 impl Block {
     /// Bucket of a cell in this block.
     #[inline(always)]
     pub(super) fn bucket(self, cell: IVec3) -> u32 {
         let place = cell & ((1 << BLOCK) - 1);
-        self.0 | (place.x | place.y << BLOCK | place.z << (2 * BLOCK)) as u32
+        self.first | ((place.x | place.y << BLOCK | place.z << (2 * BLOCK)) as u32 ^ self.turn)
     }
 }
 
@@ -103,6 +140,16 @@ mod tests {
                 assert_eq!(found.len() as i32, NEAR.pow(3), "{buckets} buckets, from {corner}");
                 assert!(found.iter().all(|bucket| (*bucket as usize) < cells.buckets()));
             }
+        }
+    }
+
+    #[test]
+    fn eight_buckets_are_those_of_eight_cells() {
+        let cells = Cells::new(1.0, 1 << 20);
+        for i in 0..1000 {
+            let corner = IVec3::new(i * 7 - 3000, 5 - i * 3, i * i - 77);
+            let one_by_one: [u32; 8] = std::array::from_fn(|k| cells.bucket(corner + IVec3::new(NEXT[0][k], NEXT[1][k], NEXT[2][k])));
+            assert_eq!(cells.buckets_of_eight(corner), one_by_one, "{corner}");
         }
     }
 
