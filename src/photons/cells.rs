@@ -1,30 +1,34 @@
 //! Cells of space and the numbers they hash to, laid out so that neighbours share memory and never a number.
 
 use glam::{IVec3, Vec3};
+use wide::bytemuck::cast;
+use wide::{f32x4, i32x8, u32x8};
 
-/// Cells of a block along an axis, as a power of two: a block's 64 buckets lie side by side.
-const BLOCK: i32 = 2;
-/// Cells of a region along an axis, as a power of two: two blocks, told apart by the parity of their place.
-const REGION: i32 = BLOCK + 1;
+/// Cells of a region along an axis, as a power of two: its 512 buckets lie side by side, row by row.
+const REGION: i32 = 3;
 /// Buckets of a region.
 pub(super) const REGION_BUCKETS: usize = 1 << (3 * REGION);
-/// Widest range of cells along an axis that lies in two blocks wherever it begins.
-pub(super) const NEAR: i32 = (1 << BLOCK) + 1;
+/// Widest range of cells along an axis in which no two share a bucket.
+pub(super) const NEAR: i32 = 5;
+/// Odd multipliers of a region's coordinates: sums of their multiples keep small offsets apart.
+const FACTORS: [u32; 3] = [0x9e37_79b1, 0x85eb_ca77, 0xc2b2_ae3d];
+/// Multiplier of the sum.
+const MIX: u32 = 0x2c1b_3c6d;
+/// Which bits of a row's place in its region the region's hash flips: the low two of y and of z.
+const FLIPS: u32 = 0b011_011_000;
 
 /// Buckets by cell: a power of two of regions, each hashed, within a region by place.
 ///
-/// Blocks next to each other, diagonally too, differ in the parity of their place along some axis and thus in their buckets, whatever the
-/// hashes of their regions. So cells within [`NEAR`] of each other never collide; cells farther apart may.
+/// The rows of a region change places, four by four, by its hash, so that regions that share their buckets seldom fill the same ones with the
+/// same plane. The highest bit of a place is never flipped: cells that lie within [`NEAR`] of each other and in different quarters differ
+/// in it along some axis, those in the same quarter belong to one region and differ by their places. So they never collide, whatever
+/// the hashes; cells farther apart may.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cells {
     inverse_side: f32,
     /// Number of regions kept apart, less one.
     mask: u32,
 }
-
-/// A block's share of the way to a bucket.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Block(u32);
 
 impl Cells {
     /// Cells of side `side` (world units, positive) in at least `buckets` buckets, at most 2^31.
@@ -44,47 +48,55 @@ impl Cells {
         p * self.inverse_side
     }
 
-    /// The cell of a position; far beyond 2^31 cells from the origin the last one there is.
+    /// The cell of a position.
     #[inline(always)]
     pub(super) fn of(&self, p: Vec3) -> IVec3 {
-        self.scaled(p).floor().as_ivec3()
+        floor(self.scaled(p))
     }
 
-    /// First bucket of the block that holds the cell.
-    #[inline(always)]
-    pub(super) fn block(&self, cell: IVec3) -> Block {
-        // Sums of odd multiples keep small offsets apart; then shifts and products until the low bits depend on every bit.
-        let region = cell >> REGION;
-        let h = (region.x as u32)
-            .wrapping_mul(0x9e37_79b1)
-            .wrapping_add((region.y as u32).wrapping_mul(0x85eb_ca77))
-            .wrapping_add((region.z as u32).wrapping_mul(0xc2b2_ae3d));
-        let h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
-        let hash = (h ^ (h >> 14)) & self.mask;
-        let parity = cell >> BLOCK & 1;
-        Block((hash << 3 | (parity.x | parity.y << 1 | parity.z << 2) as u32) << (3 * BLOCK))
-    }
-
-    /// The cell's bucket. Cells along x within a block have buckets in sequence.
+    /// The cell's bucket. Cells along x within a region have buckets in sequence.
     #[inline(always)]
     pub(super) fn bucket(&self, cell: IVec3) -> u32 {
-        self.block(cell).bucket(cell)
+        let region = cell >> REGION;
+        let [x, y, z] = [(region.x, FACTORS[0]), (region.y, FACTORS[1]), (region.z, FACTORS[2])].map(|(c, f)| (c as u32).wrapping_mul(f));
+        let h = x.wrapping_add(y).wrapping_add(z);
+        // The low bits shall depend on every bit.
+        let h = (h ^ (h >> 15)).wrapping_mul(MIX);
+        let hash = (h ^ (h >> 14)) & self.mask;
+        let place = cell & ((1 << REGION) - 1);
+        let place = (place.x | place.y << REGION | place.z << (2 * REGION)) as u32;
+        hash << (3 * REGION) | (place ^ (h >> 21 & FLIPS))
     }
-}
 
-impl Block {
-    /// Bucket of a cell in this block.
+    /// Buckets of a cell and of the seven after it along x, y, z and their sums, x first: what [`Cells::bucket`] says of each.
     #[inline(always)]
-    pub(super) fn bucket(self, cell: IVec3) -> u32 {
-        let place = cell & ((1 << BLOCK) - 1);
-        self.0 | (place.x | place.y << BLOCK | place.z << (2 * BLOCK)) as u32
+    pub(super) fn buckets_of_eight(&self, cell: IVec3) -> [u32; 8] {
+        let [x, y, z] = [(cell.x, NEXT[0]), (cell.y, NEXT[1]), (cell.z, NEXT[2])].map(|(c, next)| i32x8::splat(c) + i32x8::new(next));
+        let share = |c: i32x8, factor: u32| (c >> REGION) * i32x8::splat(factor as i32);
+        let h: u32x8 = cast(share(x, FACTORS[0]) + share(y, FACTORS[1]) + share(z, FACTORS[2]));
+        let h = (h ^ (h >> 15)) * u32x8::splat(MIX);
+        let hash = (h ^ (h >> 14)) & u32x8::splat(self.mask);
+        let inside = i32x8::splat((1 << REGION) - 1);
+        let place: u32x8 = cast((x & inside) | ((y & inside) << REGION) | ((z & inside) << (2 * REGION)));
+        let buckets: u32x8 = (hash << (3 * REGION)) | (place ^ ((h >> 21) & u32x8::splat(FLIPS)));
+        buckets.to_array()
     }
 }
 
-/// The last cell along x of the block that holds cell `x`.
+/// Corners of a cube, coordinate by coordinate.
+const NEXT: [[i32; 8]; 3] = [[0, 1, 0, 1, 0, 1, 0, 1], [0, 0, 1, 1, 0, 0, 1, 1], [0, 0, 0, 0, 1, 1, 1, 1]];
+
+/// Whole parts, downwards; beyond what 32 bits hold the last number there is, and 0 for what is no number.
 #[inline(always)]
-pub(super) fn end_of_block(x: i32) -> i32 {
-    x | ((1 << BLOCK) - 1)
+pub(super) fn floor(p: Vec3) -> IVec3 {
+    let [x, y, z, _] = f32x4::new([p.x, p.y, p.z, 0.0]).floor().trunc_int().to_array();
+    IVec3::new(x, y, z)
+}
+
+/// The last cell along x of the region that holds cell `x`.
+#[inline(always)]
+pub(super) fn end_of_row(x: i32) -> i32 {
+    x | ((1 << REGION) - 1)
 }
 
 #[cfg(test)]
@@ -103,6 +115,23 @@ mod tests {
                 assert_eq!(found.len() as i32, NEAR.pow(3), "{buckets} buckets, from {corner}");
                 assert!(found.iter().all(|bucket| (*bucket as usize) < cells.buckets()));
             }
+        }
+    }
+
+    #[test]
+    fn whole_parts_saturate() {
+        let p = Vec3::new(-0.5, 3e9, f32::NAN);
+        assert_eq!(floor(p), IVec3::new(-1, i32::MAX, 0));
+        assert_eq!(floor(Vec3::new(7.9, -3e9, -8.0)), IVec3::new(7, i32::MIN, -8));
+    }
+
+    #[test]
+    fn eight_buckets_are_those_of_eight_cells() {
+        let cells = Cells::new(1.0, 1 << 20);
+        for i in 0..1000 {
+            let corner = IVec3::new(i * 7 - 3000, 5 - i * 3, i * i - 77);
+            let one_by_one: [u32; 8] = std::array::from_fn(|k| cells.bucket(corner + IVec3::new(NEXT[0][k], NEXT[1][k], NEXT[2][k])));
+            assert_eq!(cells.buckets_of_eight(corner), one_by_one, "{corner}");
         }
     }
 
