@@ -15,12 +15,14 @@ use super::sppm::eye::Eye;
 use super::{Common, Integrator, IterationStats, MethodError};
 use crate::image::film::Film;
 use crate::photons::Grid;
+use crate::photons::density::{DensityMap, DensitySettings};
 use crate::photons::radius::shrink;
 use crate::samplers::{PhotonSampler, Uniform};
 use crate::scene::Scene;
+use crate::scene::hit::Endpoint;
 use crate::targets::points::DepthRange;
 use crate::transport::mis::{Heuristic, Sampling, Techniques, Weights};
-use crate::transport::subpath::Subpaths;
+use crate::transport::subpath::{Photons, Subpaths};
 use crate::transport::walk::Tally;
 use iteration::Iteration;
 use light::{Batch, LightSide, Merging};
@@ -38,6 +40,8 @@ struct Engine<'a> {
     photons: PhotonSettings,
     /// Radius of iteration 0, world units; what it is without merges means nothing.
     radius: f64,
+    /// What earlier iterations tell of how dense photons lie; `None` for heuristics that do not ask.
+    density: Option<DensityMap>,
     alone: Option<Technique>,
 }
 
@@ -51,7 +55,7 @@ impl<'a> Engine<'a> {
         photons: PhotonSettings,
         alone: Option<Technique>,
     ) -> Self {
-        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, alone }
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone }
     }
 
     /// Roughness from which a surface merges.
@@ -65,15 +69,10 @@ impl<'a> Engine<'a> {
         Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
     }
 
-    /// Iteration `i`, whose weights are made ready.
-    fn iteration<'w>(&'w self, i: u64, sampling: &Sampling, weights: &'w Weights<f32>) -> Iteration<'a, 'w> {
-        let subpaths = Subpaths {
-            scene: self.scene,
-            weights,
-            roughness_threshold: self.threshold(),
-            photons: None,
-            classes: self.common.paths.is_some(),
-        };
+    /// Iteration `i`, whose weights are made ready; `photons` is the expected number of photons that a merge finds, for heuristics that ask.
+    fn iteration<'w>(&'w self, i: u64, sampling: &Sampling, weights: &'w Weights<f32>, photons: Option<Photons<'w>>) -> Iteration<'a, 'w> {
+        let subpaths =
+            Subpaths { scene: self.scene, weights, roughness_threshold: self.threshold(), photons, classes: self.common.paths.is_some() };
         Iteration {
             subpaths,
             techniques: self.techniques,
@@ -117,6 +116,9 @@ impl Integrator for Engine<'_> {
                 }
             };
         }
+        if self.heuristic.asks_density() && self.techniques.merges {
+            self.density = Some(DensityMap::new(DensitySettings::for_radius(self.radius as f32)));
+        }
         Ok(stats)
     }
 
@@ -124,12 +126,26 @@ impl Integrator for Engine<'_> {
         let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
         let sampling = self.sampling(i);
         let weights = Weights::new(&sampling);
-        let iteration = self.iteration(i, &sampling, &weights);
+        let mut density = self.density.take();
+        let area = sampling.merge_area() as f32;
+        let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
+        let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
+        let iteration = self.iteration(i, &sampling, &weights, photons);
         let light = self.shoot(&iteration, film, &mut stats);
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
         let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
+        // Only now, when every weight of the iteration is known.
+        if let (Some(map), Some(merging)) = (&mut density, &merging) {
+            let grid = merging.store.grid();
+            map.insert(grid.len(), |place| grid.position(place));
+        }
+        self.density = density;
         stats
+    }
+
+    fn stateless(&self) -> bool {
+        !(self.techniques.merges && self.heuristic.asks_density())
     }
 
     fn radius(&self) -> Option<f64> {

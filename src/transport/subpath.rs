@@ -58,6 +58,9 @@ pub struct Departure {
     pub letters: Letters,
 }
 
+/// Expected number of photons that a merge finds at a point, positive.
+pub type Photons<'w> = &'w (dyn Fn(&Endpoint) -> f32 + Sync);
+
 /// What all subpaths of an iteration have in common.
 #[derive(Clone, Copy)]
 pub struct Subpaths<'a, 'w> {
@@ -67,8 +70,8 @@ pub struct Subpaths<'a, 'w> {
     pub weights: &'w Weights<f32>,
     /// Roughness of the roughest lobe from which a surface merges.
     pub roughness_threshold: f32,
-    /// Expected number of photons that a merge finds at a point, positive; `None` for heuristics that do not ask.
-    pub photons: Option<&'w (dyn Fn(&Endpoint) -> f32 + Sync)>,
+    /// How dense photons lie; `None` for heuristics that do not ask.
+    pub photons: Option<Photons<'w>>,
     /// Keep each path's class: an event at a surface with several lobes is then one of them, by their shares of the light kept, and
     /// the throughput divided by the probability.
     pub classes: bool,

@@ -105,7 +105,11 @@ fn each_connection_alone_is_the_path_tracer() {
 #[test]
 #[ignore]
 fn adhoc() {
-    let light = match std::env::var("LIGHT").unwrap().as_str() { "lamp" => LAMP, "point" => POINT, _ => SPOT };
+    let light = match std::env::var("LIGHT").unwrap().as_str() {
+        "lamp" => LAMP,
+        "point" => POINT,
+        _ => SPOT,
+    };
     let class = std::env::var("CLASS").unwrap();
     let techniques = std::env::var("TECH").unwrap();
     let n: u64 = std::env::var("N").unwrap().parse().unwrap();

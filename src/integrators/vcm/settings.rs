@@ -18,6 +18,10 @@ pub enum MergeWeightsName {
     Balance,
     /// Power heuristic with the exponent --beta
     Power,
+    /// Merges count for less where many photons lie (Jendersie and Grosch 2018)
+    VcmPlus,
+    /// The same relative to the whole path's merges
+    VcmStar,
 }
 
 /// Settings of `vcm`.
@@ -30,7 +34,7 @@ pub struct VcmSettings {
     /// How merges are weighed against connections
     #[arg(long, value_enum, default_value_t, value_name = "HOW")]
     pub merge_weights: MergeWeightsName,
-    /// Exponent of the heuristic; anything but 1 needs --merge-weights power
+    /// Exponent of the heuristic; anything but 1 with balance is refused
     #[arg(long, default_value_t = 1.0, value_name = "B")]
     pub beta: f64,
     /// One technique, with weight 1: for tests.
@@ -69,6 +73,8 @@ impl VcmSettings {
         let merges = match self.merge_weights {
             MergeWeightsName::Balance => MergeWeights::Balance,
             MergeWeightsName::Power => MergeWeights::Power,
+            MergeWeightsName::VcmPlus => MergeWeights::VcmPlus,
+            MergeWeightsName::VcmStar => MergeWeights::VcmStar,
         };
         Heuristic::new(merges, self.beta).map_err(|e| e.to_string())
     }

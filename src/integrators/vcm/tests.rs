@@ -19,8 +19,7 @@ use crate::transport::subpath::{Departure, Start, SubpathVertex};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
-const COMMON: Common =
-    Common { seed: 3, max_depth: Some(8), min_depth: 1, rr_depth: 5, hide_emitters: false, paths: None };
+const COMMON: Common = Common { seed: 3, max_depth: Some(8), min_depth: 1, rr_depth: 5, hide_emitters: false, paths: None };
 
 fn pair(s: &mut UniformStream) -> Vec2 {
     Vec2::from(s.next_2d())
@@ -79,10 +78,17 @@ impl<'a> Pair<'a> {
         let seen = scene.camera().ray(film, pair(s));
         let mut camera = Walked { vertices: Vec::new(), departure: None };
         let start = Start { ray: seen.ray, from: seen.end, throughput: Rgb::WHITE };
-        camera.departure = it.subpaths.walk(Mode::Radiance, start, s, tally, |hit, share| it.seen(&seen, hit, share), |vertex, _, _| {
-            camera.vertices.push(*vertex);
-            vertex.carried.edges < 6
-        });
+        camera.departure = it.subpaths.walk(
+            Mode::Radiance,
+            start,
+            s,
+            tally,
+            |hit, share| it.seen(&seen, hit, share),
+            |vertex, _, _| {
+                camera.vertices.push(*vertex);
+                vertex.carried.edges < 6
+            },
+        );
         let mut light = Walked { vertices: Vec::new(), departure: None };
         let mut source = None;
         let emission = scene.sample_emission(s.next_1d(), pair(s), pair(s));
@@ -291,8 +297,7 @@ fn the_engine_weighs_paths_by_their_definition() {
                 engine.radius = f64::from(scene.bounding_sphere().1) * 2e-3;
                 let sampling = engine.sampling(0);
                 let weights = Weights::new(&sampling);
-                let mut it = engine.iteration(0, &sampling, &weights);
-                it.subpaths.photons = heuristic.asks_density().then_some(&density);
+                let it = engine.iteration(0, &sampling, &weights, heuristic.asks_density().then_some(&density));
                 for index in 0..250 {
                     let key = Key { seed: 4, iteration: number as u64, index, purpose: Purpose::Test };
                     let mut s = key.stream();

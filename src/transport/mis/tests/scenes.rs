@@ -210,10 +210,10 @@ fn sound(walk: &[Walked<'_>], source: &Source) -> bool {
     light && walk.iter().all(|v| v.length > 0.1 && steep(v.point.given, &v.point) && steep(on(v), &v.point))
 }
 
-/// Is no density so small, in a lobe's far tail, that its square is out of f32's range, and no lobe so sharp that the rounding of places moves
-/// its density by a share that counts? No walk draws a direction of the first kind.
+/// Is no direction in a lobe's far tail, and no lobe so sharp, that the rounding of places moves
+/// its density by a share that counts?
 fn walkable(path: &Numbers) -> bool {
-    let sound = |pdf: f32| pdf == 0.0 || (pdf > 1e-12 && pdf < 30.0);
+    let sound = |pdf: f32| pdf == 0.0 || (pdf > 1e-5 && pdf < 30.0);
     path.events.iter().all(|e| [e.to_camera, e.to_light].into_iter().all(sound))
 }
 
