@@ -26,13 +26,18 @@ fn shared_reference(name: &str) -> Option<Reference> {
 }
 
 fn path_agrees(name: &str, iterations: u64) {
+    method_agrees("path", "{}", name, iterations);
+}
+
+/// Against a stored reference of Mitsuba's.
+fn method_agrees(method: &str, settings: &str, name: &str, iterations: u64) {
     let Some(expected) = shared_reference(name) else { return };
     let scene = load_file(&shared().unwrap().join("scenes").join(name).join("scene.xml"), Some(SIZE));
-    let images = runs(&scene, "path", "{}", &common(0, DEPTH), iterations, 16);
+    let images = runs(&scene, method, settings, &common(0, DEPTH), iterations, 16);
     let report = TileTest { block: 16, family: 0.01, cut: cut(name) }.run(&images, &expected);
-    eprintln!("path {name}, 16 seeds of {iterations}: {}", report.describe());
-    assert!(report.passed(), "path on {name}: {}", report.describe());
-    assert!((report.ratio - 1.0).abs() <= report.ratio_half_width, "path on {name}: mean ratio {}", report.describe());
+    eprintln!("{method} {name}, 16 seeds of {iterations}: {}", report.describe());
+    assert!(report.passed(), "{method} on {name}: {}", report.describe());
+    assert!((report.ratio - 1.0).abs() <= report.ratio_half_width, "{method} on {name}: mean ratio {}", report.describe());
 }
 
 macro_rules! against_shared {
@@ -51,6 +56,24 @@ against_shared! {
     path_on_modern_hall: "modern-hall", 128;
     path_on_veach_bidir: "veach-bidir", 256;
     path_on_veach_mis: "veach-mis", 256;
+}
+
+macro_rules! bidirectional_against_shared {
+    ($($test:ident: $scene:literal, $iterations:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes; run by .ci/run"]
+        fn $test() {
+            method_agrees("bdpt", "{}", $scene, $iterations);
+        }
+    )*};
+}
+
+bidirectional_against_shared! {
+    bdpt_on_cbox_spheres: "cbox-spheres", 64;
+    bdpt_on_cornell_box: "cornell-box", 64;
+    bdpt_on_modern_hall: "modern-hall", 64;
+    bdpt_on_veach_bidir: "veach-bidir", 64;
+    bdpt_on_veach_mis: "veach-mis", 64;
 }
 
 /// The scenes of this repository that have a reference, and iterations a run.
@@ -132,7 +155,7 @@ fn bdpt_on_feature_scenes() {
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn vcm_on_feature_scenes() {
-    feature_scenes("vcm", "{\"radius_pixels\": 0.5, \"alpha\": 1.0}", 0.25);
+    feature_scenes("vcm", "{\"radius_pixels\": 0.1, \"alpha\": 1.0}", 0.25);
 }
 
 /// Radius extrapolation: `E(r) = I + a r + c r^2` on constant radii, fitted on run means; the intercept meets the reference. (A disk that

@@ -183,6 +183,9 @@ impl<'a> Iteration<'a, '_> {
             }
             let Some(met) = point.meet(Mode::Radiance, photon.wi) else { return };
             let weight = self.weigh(Technique::Merge(carried.edges), self.merge_weight(&vertex.carried, &carried, &met));
+            if weight == 0.0 {
+                return;
+            }
             let mut value = met.f * photon.flux * (cosine_ratio(point, photon.wi) * weight);
             if let Some(pattern) = &self.common.paths {
                 value *= self.one_event(pattern, merging.letters(photon), (point, Mode::Radiance, photon.wi), vertex.letters);

@@ -201,13 +201,13 @@ fn paths(scene: &Scene, index: u64) -> Vec<Found> {
 
 /// Is no direction so grazing that the rounding of places moves its cosine by a share that counts?
 fn sound(walk: &[Walked<'_>], source: &Source) -> bool {
-    let steep = |d: Vec3, point: &SurfacePoint<'_>| d.dot(point.end.n_g).abs() > 0.05 && d.dot(point.frame.n).abs() > 0.05;
+    let steep = |d: Vec3, point: &SurfacePoint<'_>| d.dot(point.end.n_g).abs() > 0.1 && d.dot(point.frame.n).abs() > 0.1;
     let light = match source.light {
         PathLight::Surface(hit) => source.to_light.dot(hit.end.n_g).abs() > 0.1 && hit.t > 0.1,
         PathLight::Around(_) | PathLight::Single(_) => true,
     };
     let on = |vertex: &Walked<'_>| vertex.on.map_or(source.to_light, |on| on.d);
-    light && walk.iter().all(|v| v.length > 0.1 && steep(v.point.given, &v.point) && steep(on(v), &v.point))
+    light && walk.iter().all(|v| v.length > 0.3 && steep(v.point.given, &v.point) && steep(on(v), &v.point))
 }
 
 /// Is no direction in a lobe's far tail, and no lobe so sharp, that the rounding of places moves
@@ -243,7 +243,7 @@ fn recursion_is_the_definition_on_real_paths() {
         let scene = scene(folder);
         let radius = f64::from(scene.bounding_sphere().1) * 1e-3;
         let (mut count, mut relative, mut sum) = (0, 0.0f64, 0.0f64);
-        for Found { drawn, full } in (0..1_500).flat_map(|index| paths(&scene, index)).filter(|found| walkable(&found.drawn)) {
+        for Found { drawn, full } in (0..2_500).flat_map(|index| paths(&scene, index)).filter(|found| walkable(&found.drawn)) {
             count += 1;
             for techniques in SETS {
                 for heuristic in heuristics() {
