@@ -8,7 +8,7 @@ use isophote::integrators::Common;
 use isophote::math::statistics::{Sample, least_squares, sidak, welch};
 use isophote::scene::mitsuba::LoadedScene;
 use isophote::transport::class::pattern;
-use support::{common, image_mean, load_text, runs, sensor};
+use support::{common, image_mean, load_file, load_text, runs, sensor};
 
 const SEEDS: u64 = 16;
 
@@ -186,4 +186,25 @@ fn no_contribution_is_given_up() {
             assert_eq!(stats.rejected.get("non_finite"), None, "{method} {settings}");
         }
     }
+}
+
+/// Light tracing, that is walks of the light's side and nothing else, over bent normals: the adjoint factor. What it does for paths through lobes
+/// that are no deltas it does for all of these scenes.
+#[test]
+fn light_tracing_over_bent_normals_is_the_path_tracer() {
+    let mut failures = Vec::new();
+    for name in ["coarse-smooth-spheres", "obj-normals", "emitter-negative-scale"] {
+        let scene = load_file(&support::root().join("tests/scenes").join(name).join("scene.xml"), Some((16, 16)));
+        let base = Common { min_depth: 2, ..common(0, Some(4)) };
+        let path = path_mean(&scene, &base, 256);
+        let sample = mean(&scene, "vcm", "{\"techniques\": [\"lt\"], \"photons\": 2000}", &base, 32);
+        let p = welch(&sample, &path);
+        let spread = (sample.variance + path.variance).sqrt() / path.mean;
+        let line = format!("{name}: ratio {:.5} +- {spread:.5}, p {p:.1e}", sample.mean / path.mean);
+        eprintln!("{line}");
+        if p < sidak(0.01, 3) || spread > 0.005 {
+            failures.push(line);
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
