@@ -6,6 +6,7 @@ pub mod chains;
 pub mod path;
 pub mod photon_settings;
 pub mod sppm;
+pub mod vcm;
 
 use crate::image::film::Film;
 use crate::scene::Scene;
@@ -157,5 +158,7 @@ pub const fn method<S: Settings>(name: &'static str, about: &'static str, page: 
 /// Every method. The command line, `list`, studies, smoke tests and the documentation check walk this slice.
 pub const METHODS: &[Method] = &[
     method::<path::PathSettings>("path", "Path tracing with next event estimation", "methods/path.md"),
+    method::<vcm::BdptSettings>("bdpt", "Bidirectional path tracing", "methods/vcm.md"),
     method::<sppm::SppmSettings>("sppm", "Stochastic progressive photon mapping", "methods/sppm.md"),
+    method::<vcm::VcmSettings>("vcm", "Vertex connection and merging", "methods/vcm.md"),
 ];

@@ -8,7 +8,7 @@
 //! A sampler with a target needs the points first (`aimed`).
 
 mod aimed;
-mod eye;
+pub(super) mod eye;
 mod uniform;
 
 use super::chains::ChainReport;

@@ -82,6 +82,11 @@ impl Rgb {
     pub fn lerp(self, other: Rgb, t: f32) -> Rgb {
         Rgb(self.0 * (1.0 - t) + other.0 * t)
     }
+    /// Quotient of each component; 0 where the divisor is 0.
+    pub fn over(self, o: Rgb) -> Self {
+        let quotient = |a: f32, b: f32| if b == 0.0 { 0.0 } else { a / b };
+        Rgb::new(quotient(self.r(), o.r()), quotient(self.g(), o.g()), quotient(self.b(), o.b()))
+    }
     /// Square root of each component.
     pub fn sqrt(self) -> Self {
         self.map(f32::sqrt)

@@ -1,123 +1,152 @@
-//! A hash grid over photons, built by counting sort; the photons themselves lie in cell order.
+//! A hash grid over positions, built by counting sort in parallel; the positions lie in cell order, in vectors of eight.
+//!
+//! The grid holds positions alone and numbers them anew; what belongs to a position is brought into the same order by [`Order::gather`].
 
-use crate::math::Rgb;
+use super::cells::{Cells, NEAR, end_of_row};
+use super::sort::sort;
+use crate::math::eight::{Vec3x8, bits};
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
+use wide::f32x8;
 
-/// A photon: flux that arrived at a surface point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Photon {
-    /// Position, world units.
-    pub p: Vec3,
-    /// Unit geometric normal there.
-    pub n_g: Vec3,
-    /// Unit direction towards the light, world space.
-    pub wi: Vec3,
-    /// Flux carried (a path's, not yet divided by the number of paths), times its weight within its stratum.
-    pub flux: Rgb,
-    /// Path edges from the light to here.
-    pub depth: u16,
-    /// The sampler's stratum that drew the path.
-    pub stratum: u16,
-}
+/// Which item stands at each place of a grid.
+#[derive(Clone, Debug, Default)]
+pub struct Order(Vec<u32>);
 
-/// Photons in cell order, with where each cell's run starts.
-///
-/// Cells with equal (y, z) and neighbouring x lie in neighbouring buckets, so a query reads one contiguous run a row of cells.
-/// Different rows may share buckets; a photon counts only for the row it lies in, so none counts twice.
-#[derive(Debug)]
-pub struct PhotonGrid {
-    photons: Vec<Photon>,
-    /// Bucket `b` holds `photons[starts[b]..starts[b + 1]]`.
-    starts: Vec<u32>,
-    mask: u32,
-    inverse_cell: f32,
-}
-
-impl PhotonGrid {
-    /// Sorts the photons into cells of side `cell` (world units, positive). At most 2^32 - 1 photons.
-    pub fn build(photons: Vec<Photon>, cell: f32) -> Self {
-        let inverse_cell = 1.0 / cell;
-        let buckets = (photons.len().max(1) * 2).next_power_of_two().min(1 << 31);
-        let mask = (buckets - 1) as u32;
-        let keys: Vec<u32> = photons.par_iter().map(|photon| bucket(cell_of(photon.p, inverse_cell), mask)).collect();
-
-        // Counting sort: stable, so the order within a bucket is the order of emission.
-        let mut starts = vec![0u32; buckets + 1];
-        for &key in &keys {
-            starts[key as usize + 1] += 1;
-        }
-        let mut sum = 0;
-        for start in &mut starts {
-            sum += *start;
-            *start = sum;
-        }
-        let mut next = starts.clone();
-        let mut order = vec![0u32; photons.len()];
-        for (i, &key) in keys.iter().enumerate() {
-            let place = &mut next[key as usize];
-            order[*place as usize] = i as u32;
-            *place += 1;
-        }
-        let sorted = order.par_iter().map(|&i| photons[i as usize]).collect();
-        Self { photons: sorted, starts, mask, inverse_cell }
-    }
-
-    /// Photons kept.
+impl Order {
+    /// Places there are.
     pub fn len(&self) -> usize {
-        self.photons.len()
+        self.0.len()
     }
 
-    /// No photon at all.
+    /// No place at all.
     pub fn is_empty(&self) -> bool {
-        self.photons.is_empty()
+        self.0.is_empty()
     }
 
-    /// Calls `visit` with every photon closer than `radius` to `p` and its squared distance, each exactly once, in an order that depends
-    /// on the photons alone.
+    /// Numbers of the items, as they were given to [`Grid::build`], place by place.
+    pub fn items(&self) -> &[u32] {
+        &self.0
+    }
+
+    /// What belongs to the items, place by place; `item` is asked once for the number of each.
+    pub fn gather<T: Send>(&self, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        self.0.par_iter().with_min_len(1 << 12).map(|&i| item(i as usize)).collect()
+    }
+}
+
+/// Positions in cell order, with where each cell's run starts.
+///
+/// A row of cells along x is one contiguous run, or more where it leaves a region of eight. A query no wider than five cells meets no
+/// collision (`cells` says why); in a wider one a position counts for the row it lies in alone, so none counts twice.
+#[derive(Debug)]
+pub struct Grid {
+    lanes: Vec<Vec3x8>,
+    count: usize,
+    /// Bucket `b` holds the places `starts[b]..starts[b + 1]`.
+    starts: Vec<u32>,
+    cells: Cells,
+}
+
+impl Grid {
+    /// Side of the cells for queries of radius `radius`: a query touches two cells an axis, or three with the probability 0.
+    pub fn cell_for(radius: f32) -> f32 {
+        2.0 * radius
+    }
+
+    /// Sorts `count` positions (at most 2^32 - 1) into cells of side `cell` (world units, positive). The order, and so that in which queries
+    /// visit, depends on the positions and the side alone: rows by z, then y, cells by x, in a cell the order of the numbers.
+    pub fn build(count: usize, position: impl Fn(usize) -> Vec3 + Sync, cell: f32) -> (Self, Order) {
+        Self::with_buckets(count, position, cell, 2 * count)
+    }
+
+    fn with_buckets(count: usize, position: impl Fn(usize) -> Vec3 + Sync, cell: f32, buckets: usize) -> (Self, Order) {
+        let cells = Cells::new(cell, buckets);
+        let sorted = sort(count, cells.buckets(), |i| cells.bucket(cells.of(position(i))));
+        let eight = |numbers: &[u32]| {
+            let mut lanes = [[f32::NAN; 8]; 3];
+            for (lane, &i) in numbers.iter().enumerate() {
+                let p = position(i as usize);
+                [lanes[0][lane], lanes[1][lane], lanes[2][lane]] = [p.x, p.y, p.z];
+            }
+            Vec3x8::new(&lanes)
+        };
+        let lanes = sorted.order.par_chunks(8).with_min_len(1 << 9).map(eight).collect();
+        (Self { lanes, count, starts: sorted.starts, cells }, Order(sorted.order))
+    }
+
+    /// Positions kept.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// No position at all.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The position at a place.
+    #[inline(always)]
+    pub fn position(&self, place: usize) -> Vec3 {
+        let (lanes, lane) = (&self.lanes[place / 8], place & 7);
+        Vec3::new(lanes.x.as_array()[lane], lanes.y.as_array()[lane], lanes.z.as_array()[lane])
+    }
+
+    /// Calls `visit` with the place of every position closer than `radius` to `p` and its squared distance, each exactly once, in an order
+    /// that depends on the positions and the cells' side alone. Allocates nothing.
     #[inline]
-    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(&Photon, f32)) {
-        let low = cell_of(p - Vec3::splat(radius), self.inverse_cell);
-        let high = cell_of(p + Vec3::splat(radius), self.inverse_cell);
-        let radius2 = radius * radius;
+    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(usize, f32)) {
+        // A position just outside the box may be found closer than the radius by rounding alone.
+        let reach = Vec3::splat(radius * (1.0 + 1e-6));
+        let (low, high) = (self.cells.of(p - reach), self.cells.of(p + reach));
+        let (from, radius2) = (Vec3x8::splat(p), f32x8::splat(radius * radius));
+        let near = high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all();
         for z in low.z..=high.z {
             for y in low.y..=high.y {
-                let first = bucket(IVec3::new(low.x, y, z), self.mask);
-                let count = ((high.x - low.x) as u32).min(self.mask);
-                let last = first.wrapping_add(count) & self.mask;
-                let mut run = |from: u32, to: u32| {
-                    let photons = &self.photons[self.starts[from as usize] as usize..self.starts[to as usize + 1] as usize];
-                    for photon in photons {
-                        let distance2 = photon.p.distance_squared(p);
-                        if distance2 < radius2 {
-                            let cell = cell_of(photon.p, self.inverse_cell);
-                            if cell.y == y && cell.z == z && cell.x >= low.x && cell.x <= high.x {
-                                visit(photon, distance2);
+                let mut x = low.x;
+                loop {
+                    let last = end_of_row(x).min(high.x);
+                    let bucket = self.cells.bucket(IVec3::new(x, y, z)) as usize;
+                    let run = (self.starts[bucket] as usize, self.starts[bucket + (last - x) as usize + 1] as usize);
+                    if near {
+                        self.visit_run(run, from, radius2, &mut visit);
+                    } else {
+                        let (first, last) = (IVec3::new(x, y, z), IVec3::new(last, y, z));
+                        self.visit_run(run, from, radius2, &mut |place, distance2| {
+                            let cell = self.cells.of(self.position(place));
+                            if cell.cmpge(first).all() && cell.cmple(last).all() {
+                                visit(place, distance2);
                             }
-                        }
+                        });
                     }
-                };
-                if first <= last {
-                    run(first, last);
-                } else {
-                    run(first, self.mask);
-                    run(0, last);
+                    if last == high.x {
+                        break;
+                    }
+                    x = last + 1;
                 }
             }
         }
     }
-}
 
-#[inline(always)]
-fn cell_of(p: Vec3, inverse_cell: f32) -> IVec3 {
-    (p * inverse_cell).floor().as_ivec3()
-}
-
-/// Teschner et al.'s primes for the row; x runs on within it.
-#[inline(always)]
-fn bucket(cell: IVec3, mask: u32) -> u32 {
-    let row = (cell.y as u32).wrapping_mul(19_349_663) ^ (cell.z as u32).wrapping_mul(83_492_791);
-    row.wrapping_mul(0x9e37_79b9).rotate_left(15).wrapping_add(cell.x as u32) & mask
+    /// Visits those of the places `start..end` that are closer than the root of `radius2`.
+    #[inline(always)]
+    fn visit_run(&self, (start, end): (usize, usize), from: Vec3x8, radius2: f32x8, visit: &mut impl FnMut(usize, f32)) {
+        let mut place = start & !7;
+        while place < end {
+            let between = self.lanes[place / 8] - from;
+            let distance2 = between.dot(between);
+            let mut inside = bits(distance2.simd_lt(radius2), (end - place).min(8)) & (u32::MAX << start.saturating_sub(place));
+            if inside != 0 {
+                let distance2 = distance2.to_array();
+                while inside != 0 {
+                    let lane = inside.trailing_zeros() as usize;
+                    visit(place + lane, distance2[lane & 7]);
+                    inside &= inside - 1;
+                }
+            }
+            place += 8;
+        }
+    }
 }
 
 #[cfg(test)]
@@ -125,32 +154,96 @@ mod tests {
     use super::*;
     use isophote_samplers::{Key, Purpose, Stream};
 
+    fn points(count: usize, scale: f32) -> Vec<Vec3> {
+        let mut s = Key { seed: 1, iteration: 0, index: 0, purpose: Purpose::Test }.stream();
+        (0..count).map(|_| Vec3::new(s.next_1d() - 0.5, s.next_1d() - 0.5, 0.1 * s.next_1d()) * scale).collect()
+    }
+
+    /// Numbers of the points found, ascending.
+    fn found(grid: &Grid, order: &Order, p: Vec3, radius: f32) -> Vec<u32> {
+        let mut found = Vec::new();
+        grid.query(p, radius, |place, distance2| {
+            assert_eq!(distance2, grid.position(place).distance_squared(p));
+            found.push(order.items()[place]);
+        });
+        found.sort_unstable();
+        found
+    }
+
+    fn by_brute_force(points: &[Vec3], p: Vec3, radius: f32) -> Vec<u32> {
+        (0..points.len() as u32).filter(|i| points[*i as usize].distance_squared(p) < radius * radius).collect()
+    }
+
     #[test]
     fn queries_find_exactly_what_brute_force_finds() {
-        let mut s = Key { seed: 1, iteration: 0, index: 0, purpose: Purpose::Test }.stream();
-        let mut point = |scale: f32| Vec3::new(s.next_1d() - 0.5, s.next_1d() - 0.5, 0.1 * s.next_1d()) * scale;
         for (scale, cell) in [(1.0, 0.02), (1.0, 0.3), (1000.0, 5.0), (1e-3, 1e-4)] {
-            let photons: Vec<Photon> = (0..5000)
-                .map(|i| Photon { p: point(scale), n_g: Vec3::Z, wi: Vec3::Z, flux: Rgb::splat(i as f32), depth: 1, stratum: 0 })
-                .collect();
-            let grid = PhotonGrid::build(photons.clone(), cell);
-            assert_eq!(grid.len(), photons.len());
-            for _ in 0..200 {
-                let p = point(scale);
-                for radius in [0.3 * cell, cell, 4.1 * cell] {
-                    let mut found: Vec<u32> = Vec::new();
-                    grid.query(p, radius, |photon, _| found.push(photon.flux.r() as u32));
-                    found.sort_unstable();
-                    let inside = |q: &Photon| q.p.distance_squared(p) < radius * radius;
-                    let expected: Vec<u32> = photons.iter().filter(|q| inside(q)).map(|q| q.flux.r() as u32).collect();
-                    assert_eq!(found, expected, "scale {scale}, cell {cell}, radius {radius}");
+            let points = points(5000, scale);
+            let (grid, order) = Grid::build(points.len(), |i| points[i], cell);
+            assert_eq!((grid.len(), order.len()), (points.len(), points.len()));
+            assert_eq!(order.gather(|i| points[i]), (0..points.len()).map(|place| grid.position(place)).collect::<Vec<_>>());
+            for &p in points.iter().step_by(25) {
+                for radius in [0.3 * cell, cell, 1.9 * cell, 4.1 * cell] {
+                    assert_eq!(
+                        found(&grid, &order, p, radius),
+                        by_brute_force(&points, p, radius),
+                        "scale {scale}, cell {cell}, radius {radius}"
+                    );
                 }
+            }
+        }
+    }
+
+    /// One region of buckets for all of space, so that far cells share buckets: each position is visited once by queries of every width, and
+    /// the buckets of a wide one do collide.
+    #[test]
+    fn buckets_that_collide_are_visited_once() {
+        let points = points(3000, 40.0);
+        let (grid, order) = Grid::with_buckets(points.len(), |i| points[i], 1.0, 1);
+        let of_cell = |i: i32| grid.cells.bucket(IVec3::new(i % 10, i / 10 % 10, i / 100));
+        let buckets: std::collections::BTreeSet<u32> = (0..1000).map(of_cell).collect();
+        assert!(buckets.len() <= 512, "a thousand neighbours share buckets");
+        for &p in points.iter().step_by(20) {
+            for radius in [0.4, 1.0, 1.9, 2.6, 5.0, 12.0] {
+                assert_eq!(found(&grid, &order, p, radius), by_brute_force(&points, p, radius), "radius {radius}");
+            }
+        }
+    }
+
+    /// Positions at cells' borders, where a distance that rounds down reaches past the box of the query.
+    #[test]
+    fn rounding_at_borders_loses_nothing() {
+        let points: Vec<Vec3> = (0..4000).map(|i| Vec3::new(100.0 + i as f32 * 0.001, 0.0, 0.0)).collect();
+        for cell in [0.001, 0.0013, 0.002] {
+            let (grid, order) = Grid::build(points.len(), |i| points[i], cell);
+            for &p in points.iter().step_by(7) {
+                for radius in [0.000_999_9, 0.001, 0.001_000_1, 0.002, 0.003] {
+                    assert_eq!(found(&grid, &order, p, radius), by_brute_force(&points, p, radius), "cell {cell}, radius {radius}");
+                }
+            }
+        }
+    }
+
+    /// Rows by z, then y, cells by x, in a cell the order of the numbers: what sums over a query depend on.
+    #[test]
+    fn the_order_of_a_query_is_that_of_cells() {
+        let points = points(4000, 1.0);
+        for (cell, radius) in [(0.1, 0.05), (0.05, 0.11), (0.02, 0.1)] {
+            let (grid, order) = Grid::build(points.len(), |i| points[i], cell);
+            for &p in points.iter().step_by(50) {
+                let mut visited = Vec::new();
+                grid.query(p, radius, |place, _| {
+                    let of = grid.cells.of(grid.position(place));
+                    visited.push((of.z, of.y, of.x, order.items()[place]));
+                });
+                assert!(visited.is_sorted(), "cell {cell}, radius {radius}");
             }
         }
     }
 
     #[test]
     fn an_empty_grid_answers_nothing() {
-        PhotonGrid::build(Vec::new(), 1.0).query(Vec3::ZERO, 10.0, |_, _| panic!("found something"));
+        let (grid, order) = Grid::build(0, |_| Vec3::ZERO, 1.0);
+        assert!(grid.is_empty() && order.is_empty());
+        grid.query(Vec3::ZERO, 10.0, |_, _| panic!("found something"));
     }
 }

@@ -1,6 +1,12 @@
-//! How photons are kept: the store, the grid that finds them, the radius schedule.
+//! How photons are kept: the store, the grid that finds them, how dense they lie, the radius schedule.
 
+mod cells;
+pub mod density;
 pub mod grid;
 pub mod radius;
+mod sort;
+pub mod store;
 
-pub use grid::PhotonGrid;
+pub use density::{DensityMap, DensitySettings};
+pub use grid::{Grid, Order};
+pub use store::{Photon, Store};

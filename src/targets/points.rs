@@ -46,6 +46,14 @@ pub struct DepthRange {
     pub max: u32,
 }
 
+impl DepthRange {
+    /// Does a path of so many edges count?
+    #[inline]
+    pub fn contains(&self, edges: u32) -> bool {
+        self.min <= edges && edges <= self.max
+    }
+}
+
 /// A light vertex inside a measurement point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Touch {

@@ -22,6 +22,8 @@
 //! event's probability times the geometry, and that of `x_{i+1}` is divided by `d omega_{i+1} / d omega_{i-1}`, which is
 //! 1 in reflection ([`Scatter::refraction`](super::mis::Scatter::refraction) says more).
 
+pub mod scene;
+
 use super::mis::Sampling;
 
 /// What is known of one vertex.

@@ -17,11 +17,16 @@ pub fn accepts(n_g: Vec3, n_s: Vec3, photon_n_g: Vec3, wi: Vec3) -> bool {
     photon_n_g.dot(n_g) >= NORMAL_COSINE && sides_agree(wi, n_g, n_s)
 }
 
-/// What one accepted photon inside the disk adds per unit of flux: `f |wi.n_s|/|wi.n_g|`, per steradian. Photons arrive per geometric area,
-/// so the shading cosine enters as a ratio ([VEACH 5.3]).
+/// What one accepted photon inside the disk adds per unit of flux: `f |wi.n_s|/|wi.n_g|`, per steradian.
 #[inline]
 pub fn merge(at: &SurfacePoint<'_>, wi: Vec3, threshold: f32) -> Rgb {
     let local = at.frame.to_local(wi);
     let ratio = local.z.abs() / wi.dot(at.end.n_g).abs();
     at.bsdf.eval(at.uv, local, at.given_local, Lobes::Rough(threshold)) * ratio
+}
+
+/// `|wi.n_s|/|wi.n_g|`: photons arrive per geometric area, so the shading cosine enters as a ratio ([VEACH 5.3]).
+#[inline(always)]
+pub fn cosine_ratio(at: &SurfacePoint<'_>, wi: Vec3) -> f32 {
+    (wi.dot(at.frame.n) / wi.dot(at.end.n_g)).abs()
 }

@@ -5,4 +5,6 @@ pub mod densities;
 pub mod merge;
 pub mod mis;
 pub mod shading;
+pub mod subpath;
+pub mod survival;
 pub mod walk;

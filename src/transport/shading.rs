@@ -1,7 +1,7 @@
 //! Scattering at a surface point in world space: shading normals, their adjoint factor, and the rule for sides that disagree.
 
 use crate::math::{Frame, Rgb};
-use crate::scene::bsdf::{Bsdf, Lobes, Mode};
+use crate::scene::bsdf::{Bsdf, BsdfSample, Lobes, Mode};
 use crate::scene::hit::{Endpoint, Hit};
 use glam::{Vec2, Vec3};
 
@@ -79,16 +79,30 @@ impl<'a> SurfacePoint<'a> {
     /// A next direction. `None` where the walk ends: absorbed, or the sides of the sampled direction disagree.
     #[inline(always)]
     pub fn sample(&self, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<Scattered> {
-        let s = self.bsdf.sample(self.uv, self.given_local, mode, lobes, u_lobe, u)?;
-        let d = self.frame.to_world(s.w);
-        if !sides_agree(d, self.end.n_g, self.frame.n) {
-            return None;
-        }
+        let (s, d) = self.draw(mode, lobes, u_lobe, u)?;
         let weight = match mode {
             Mode::Radiance => s.weight,
             Mode::Importance => s.weight * self.adjoint(d),
         };
         Some(Scattered { d, weight, pdf_fwd: s.pdf_fwd, pdf_rev: s.pdf_rev, delta: s.delta, roughness: s.roughness, eta: s.eta })
+    }
+
+    /// [`SurfacePoint::sample`] as the material says it, without the adjoint factor, and the world direction.
+    #[inline(always)]
+    pub(super) fn draw(&self, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<(BsdfSample, Vec3)> {
+        let s = self.bsdf.sample(self.uv, self.given_local, mode, lobes, u_lobe, u)?;
+        let d = self.frame.to_world(s.w);
+        sides_agree(d, self.end.n_g, self.frame.n).then_some((s, d))
+    }
+
+    /// What a value `f` is multiplied by, for a walk that came from `given` and leaves along `d`: the cosine with the shading normal, and in
+    /// importance mode [`SurfacePoint::adjoint`].
+    #[inline(always)]
+    pub fn cosine(&self, mode: Mode, d: Vec3) -> f32 {
+        match mode {
+            Mode::Radiance => d.dot(self.frame.n).abs(),
+            Mode::Importance => (self.given_local.z * d.dot(self.end.n_g) / self.given.dot(self.end.n_g)).abs(),
+        }
     }
 
     /// The adjoint factor of shading normals, `|wi.n_s| |wo.n_g| / (|wi.n_g| |wo.n_s|)`, for a light-side walk that came along `wi` =

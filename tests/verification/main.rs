@@ -26,13 +26,18 @@ fn shared_reference(name: &str) -> Option<Reference> {
 }
 
 fn path_agrees(name: &str, iterations: u64) {
+    method_agrees("path", "{}", name, iterations);
+}
+
+/// Against a stored reference of Mitsuba's.
+fn method_agrees(method: &str, settings: &str, name: &str, iterations: u64) {
     let Some(expected) = shared_reference(name) else { return };
     let scene = load_file(&shared().unwrap().join("scenes").join(name).join("scene.xml"), Some(SIZE));
-    let images = runs(&scene, "path", "{}", &common(0, DEPTH), iterations, 16);
+    let images = runs(&scene, method, settings, &common(0, DEPTH), iterations, 16);
     let report = TileTest { block: 16, family: 0.01, cut: cut(name) }.run(&images, &expected);
-    eprintln!("path {name}, 16 seeds of {iterations}: {}", report.describe());
-    assert!(report.passed(), "path on {name}: {}", report.describe());
-    assert!((report.ratio - 1.0).abs() <= report.ratio_half_width, "path on {name}: mean ratio {}", report.describe());
+    eprintln!("{method} {name}, 16 seeds of {iterations}: {}", report.describe());
+    assert!(report.passed(), "{method} on {name}: {}", report.describe());
+    assert!((report.ratio - 1.0).abs() <= report.ratio_half_width, "{method} on {name}: mean ratio {}", report.describe());
 }
 
 macro_rules! against_shared {
@@ -51,6 +56,24 @@ against_shared! {
     path_on_modern_hall: "modern-hall", 128;
     path_on_veach_bidir: "veach-bidir", 256;
     path_on_veach_mis: "veach-mis", 256;
+}
+
+macro_rules! bidirectional_against_shared {
+    ($($test:ident: $scene:literal, $iterations:literal;)*) => {$(
+        #[test]
+        #[ignore = "minutes; run by .ci/run"]
+        fn $test() {
+            method_agrees("bdpt", "{}", $scene, $iterations);
+        }
+    )*};
+}
+
+bidirectional_against_shared! {
+    bdpt_on_cbox_spheres: "cbox-spheres", 64;
+    bdpt_on_cornell_box: "cornell-box", 64;
+    bdpt_on_modern_hall: "modern-hall", 64;
+    bdpt_on_veach_bidir: "veach-bidir", 64;
+    bdpt_on_veach_mis: "veach-mis", 64;
 }
 
 /// The scenes of this repository that have a reference, and iterations a run.
@@ -85,10 +108,9 @@ fn path_on_own_scenes() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// One small scene per feature of the loader, the cameras, the lights and the materials: `path` agrees with Mitsuba on each.
-#[test]
-#[ignore = "minutes; run by .ci/run"]
-fn path_on_feature_scenes() {
+/// One small scene per feature of the loader, the cameras, the lights and the materials: a method agrees with Mitsuba on each, with `share` of
+/// the reference's samples a run. `ONLY` in the environment names one scene.
+fn feature_scenes(method: &str, settings: &str, share: f64) {
     let folder = root().join("tests/scenes");
     let manifest: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(folder.join("manifest.json")).unwrap()).unwrap();
     let scenes = manifest["scenes"].as_array().unwrap();
@@ -97,13 +119,17 @@ fn path_on_feature_scenes() {
     let mut failures = Vec::new();
     for entry in scenes {
         let name = entry["name"].as_str().unwrap();
+        if std::env::var("ONLY").is_ok_and(|only| only != name) {
+            continue;
+        }
         let expected = reference(&folder.join(entry["reference"].as_str().unwrap()), entry["runs"].as_u64().unwrap() as usize);
         let scene = load_file(&folder.join(entry["scene"].as_str().unwrap()), None);
         let depth = entry["max_depth"].as_i64().and_then(|d| u32::try_from(d).ok());
         let base = isophote::integrators::Common { hide_emitters: scene.defaults.hide_emitters, ..common(0, depth) };
-        let images = runs(&scene, "path", "{}", &base, entry["spp"].as_u64().unwrap(), 16);
+        let iterations = (entry["spp"].as_f64().unwrap() * share).ceil() as u64;
+        let images = runs(&scene, method, settings, &base, iterations, 16);
         let report = TileTest { block: 16, family, cut: 0.0 }.run(&images, &expected);
-        eprintln!("path {name}: {}", report.describe());
+        eprintln!("{method} {name}: {}", report.describe());
         // A difference that is known, bounded and explained (docs/shading-normals.md): this tile alone, and through it the image.
         let known = |tile: Option<(usize, usize)>| name == "emitter-negative-scale" && tile.is_none_or(|t| t == (2, 0));
         if report.failures().any(|r| !known(r.tile)) {
@@ -111,6 +137,25 @@ fn path_on_feature_scenes() {
         }
     }
     assert!(failures.is_empty(), "{} scenes disagree:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn path_on_feature_scenes() {
+    feature_scenes("path", "{}", 1.0);
+}
+
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn bdpt_on_feature_scenes() {
+    feature_scenes("bdpt", "{}", 0.25);
+}
+
+/// A radius so small that its bias is below the noise.
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn vcm_on_feature_scenes() {
+    feature_scenes("vcm", "{\"radius_pixels\": 0.1, \"alpha\": 1.0}", 0.25);
 }
 
 /// Radius extrapolation: `E(r) = I + a r + c r^2` on constant radii, fitted on run means; the intercept meets the reference. (A disk that

@@ -43,13 +43,13 @@ pub(super) struct Seen<'a> {
 
 /// Camera subpaths of a scene.
 #[derive(Clone)]
-pub(super) struct Eye<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) common: Common,
+pub(in crate::integrators) struct Eye<'a> {
+    pub(in crate::integrators) scene: &'a Scene,
+    pub(in crate::integrators) common: Common,
     /// Width and height, pixels.
-    pub(super) size: (usize, usize),
+    pub(in crate::integrators) size: (usize, usize),
     /// Roughness from which lobes are measured at.
-    pub(super) threshold: f32,
+    pub(in crate::integrators) threshold: f32,
 }
 
 impl<'a> Eye<'a> {
@@ -134,7 +134,7 @@ impl<'a> Eye<'a> {
     }
 
     /// Median footprint over pixel centres, on a key of its own ([interface: Footprint]).
-    pub(super) fn median_footprint(&self, stats: &mut IterationStats) -> Option<f32> {
+    pub(in crate::integrators) fn median_footprint(&self, stats: &mut IterationStats) -> Option<f32> {
         let mut tally = Tally::default();
         let mut footprints: Vec<f32> = Vec::new();
         for pixel in 0..self.pixels() {

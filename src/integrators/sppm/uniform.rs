@@ -3,24 +3,25 @@
 use super::{Counts, IterationStats, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
-use crate::photons::grid::{Photon, PhotonGrid};
 use crate::photons::radius::shrink;
+use crate::photons::{Photon, Store};
 use crate::samplers::{Drawn, PhotonSampler, Uniform};
 use crate::targets::LightPath;
 use crate::targets::points::MeasurementPoint;
 use crate::transport::merge::{accepts, merge};
 use crate::transport::walk::Tally;
+use glam::Vec3;
 
 impl Sppm<'_> {
     /// An iteration; it depends on its index, settings and seed alone.
     pub(super) fn iterate_uniform(&self, i: u64, film: &mut Film, stats: &mut IterationStats) -> Counts {
-        let (grid, scales) = self.shoot(i, stats);
+        let (photons, scales) = self.shoot(i, stats);
         let radius = self.radius_at(i);
         let width = self.eye.size.0;
         let sample = |(tally, counts): &mut (Tally, Counts), x: usize, y: usize| {
             let seen = self.eye.sample(i, y * width + x, radius, tally);
             counts.glossy.see(&seen);
-            let gathered = seen.measured.as_ref().map_or(Rgb::BLACK, |m| self.gather(m, &grid, &scales, &mut counts.deposits));
+            let gathered = seen.measured.as_ref().map_or(Rgb::BLACK, |m| self.gather(m, &photons, &scales, &mut counts.deposits));
             tally.finite(self.emission(&seen) + gathered)
         };
         let mut all = Counts::default();
@@ -32,18 +33,14 @@ impl Sppm<'_> {
     }
 
     /// Light subpaths to photons, sorted into a grid.
-    fn shoot(&self, i: u64, stats: &mut IterationStats) -> (PhotonGrid, Vec<f64>) {
+    fn shoot(&self, i: u64, stats: &mut IterationStats) -> (Store<Photon>, Vec<f64>) {
         let paths = self.light_paths();
-        let keep = |(photons, tally): &mut (Vec<Photon>, Tally), path: &LightPath, drawn: &[Drawn]| {
+        let keep = |(photons, tally): &mut (Vec<(Vec3, Photon)>, Tally), path: &LightPath, drawn: &[Drawn]| {
             tally.add(&path.tally);
             for drawn in drawn {
-                photons.extend(path.vertices.iter().map(|v| Photon {
-                    p: v.end.p,
-                    n_g: v.end.n_g,
-                    wi: v.wi,
-                    flux: v.flux * drawn.weight as f32,
-                    depth: v.depth as u16,
-                    stratum: drawn.stratum as u16,
+                photons.extend(path.vertices.iter().map(|v| {
+                    let flux = v.flux * drawn.weight as f32;
+                    (v.end.p, Photon { n_g: v.end.n_g, wi: v.wi, flux, depth: v.depth as u16, stratum: drawn.stratum as u16 })
                 }));
             }
         };
@@ -57,15 +54,15 @@ impl Sppm<'_> {
         }
         stats.light_paths += draw.traced;
         let cell = self.cell * shrink(i, self.settings.alpha) as f32;
-        (PhotonGrid::build(photons, cell), draw.scales)
+        (Store::build(photons.len(), |i| photons[i].0, |i| photons[i].1, cell), draw.scales)
     }
 
     /// Flux density around a measurement point, strata scaled, times throughput and BSDF. Counts the photons it takes.
-    fn gather(&self, at: &MeasurementPoint<'_>, grid: &PhotonGrid, scales: &[f64], taken: &mut u64) -> Rgb {
+    fn gather(&self, at: &MeasurementPoint<'_>, photons: &Store<Photon>, scales: &[f64], taken: &mut u64) -> Rgb {
         let mut sum = Rgb::BLACK;
         let depths = self.eye.depths();
         let (n_g, n_s) = (at.point.end.n_g, at.point.frame.n);
-        grid.query(at.point.end.p, at.radius, |photon, _| {
+        photons.query(at.point.end.p, at.radius, |photon, _| {
             let depth = at.depth + u32::from(photon.depth);
             if depth <= depths.max && depth >= depths.min && accepts(n_g, n_s, photon.n_g, photon.wi) {
                 *taken += 1;

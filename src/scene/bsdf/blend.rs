@@ -1,6 +1,6 @@
 //! A weighted sum of two materials.
 
-use super::{Bsdf, BsdfSample, Lobes, Mode};
+use super::{Bsdf, BsdfSample, DeltaLobe, Lobes, Mode};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -90,6 +90,12 @@ impl Blend {
 
     pub(super) fn anisotropic(&self) -> bool {
         self.first.anisotropic() || self.second.anisotropic()
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        let (weight, p) = self.shares(uv, Lobes::All);
+        let first = self.first.delta(uv, given, sampled).map(|lobe| lobe.part(1.0 - p, 1.0 - weight));
+        first.or_else(|| self.second.delta(uv, given, sampled).map(|lobe| lobe.part(p, weight)))
     }
 
     pub(super) fn transmissive(&self) -> bool {

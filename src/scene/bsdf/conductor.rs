@@ -1,6 +1,6 @@
 //! Smooth metal, black from behind.
 
-use super::{BsdfSample, Lobes, Mode, fresnel};
+use super::{BsdfSample, DeltaLobe, Lobes, Mode, fresnel, mirrored, same_direction};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -34,6 +34,11 @@ impl Conductor {
             return 0.0;
         }
         (fresnel::conductor(given.z, self.eta, self.k) * self.specular_reflectance.eval(uv)).mean()
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        let value = || fresnel::conductor(given.z, self.eta, self.k) * self.specular_reflectance.eval(uv);
+        (given.z > 0.0 && same_direction(mirrored(given), sampled)).then(|| DeltaLobe { probability: 1.0, value: value(), eta: 1.0 })
     }
 
     pub(super) fn transmissive(&self) -> bool {

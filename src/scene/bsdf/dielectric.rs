@@ -1,6 +1,6 @@
 //! Smooth glass.
 
-use super::{BsdfSample, Lobes, Mode, fresnel};
+use super::{BsdfSample, DeltaLobe, Lobes, Mode, fresnel, mirrored, same_direction};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -48,6 +48,21 @@ impl Dielectric {
         }
         let reflectance = fresnel::dielectric(given.z, self.eta).reflectance;
         self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), reflectance).mean()
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        if given.z == 0.0 {
+            return None;
+        }
+        let at = fresnel::dielectric(given.z, self.eta);
+        if given.z * sampled.z > 0.0 {
+            let value = self.specular_reflectance.eval(uv) * at.reflectance;
+            return same_direction(mirrored(given), sampled).then_some(DeltaLobe { probability: at.reflectance, value, eta: 1.0 });
+        }
+        let refracted = Vec3::new(-given.x / at.eta, -given.y / at.eta, at.cos_transmitted).normalize();
+        let found = at.reflectance < 1.0 && same_direction(refracted, sampled);
+        let probability = 1.0 - at.reflectance;
+        found.then(|| DeltaLobe { probability, value: self.specular_transmittance.eval(uv) * probability, eta: at.eta })
     }
 
     pub(super) fn transmissive(&self) -> bool {

@@ -70,6 +70,8 @@ impl Diffuse {
         false
     }
 
+    no_delta!();
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

@@ -1,6 +1,6 @@
 //! A material with holes.
 
-use super::{Bsdf, BsdfSample, Lobes, Mode};
+use super::{Bsdf, BsdfSample, DeltaLobe, Lobes, Mode, same_direction};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -78,6 +78,13 @@ impl Mask {
 
     pub(super) fn anisotropic(&self) -> bool {
         self.nested.anisotropic()
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        let (opacity, p) = self.shares(uv, Lobes::All);
+        let hole = DeltaLobe { probability: 1.0 - p, value: Rgb::splat(1.0 - opacity), eta: 1.0 };
+        let through = || (same_direction(-given, sampled) && opacity < 1.0).then_some(hole);
+        self.nested.delta(uv, given, sampled).map(|lobe| lobe.part(p, opacity)).or_else(through)
     }
 
     pub(super) fn transmissive(&self) -> bool {

@@ -75,6 +75,37 @@ pub struct BsdfSample {
     pub eta: f32,
 }
 
+/// The delta lobe that joins two directions, as [`Bsdf::delta`] finds it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeltaLobe {
+    /// Probability with which a walk that came from the given direction chooses it: what [`BsdfSample::pdf_fwd`] would be.
+    pub probability: f32,
+    /// Share of the light from the given direction that goes this way: the sample's weight in importance mode times the probability.
+    pub value: Rgb,
+    /// As [`BsdfSample::eta`].
+    pub eta: f32,
+}
+
+impl DeltaLobe {
+    /// The same lobe where a walk comes to it with this probability, and this share of the light.
+    #[inline]
+    fn part(self, probability: f32, share: f32) -> Self {
+        Self { probability: self.probability * probability, value: self.value * share, ..self }
+    }
+}
+
+/// Are two unit directions one but for the rounding of the points they were found from? 3 mrad.
+#[inline]
+fn same_direction(a: Vec3, b: Vec3) -> bool {
+    a.distance_squared(b) < 1e-5
+}
+
+/// The mirror image of a direction.
+#[inline]
+fn mirrored(w: Vec3) -> Vec3 {
+    Vec3::new(-w.x, -w.y, w.z)
+}
+
 impl BsdfSample {
     /// Itself, or nothing if it carries nothing: the walk ends there.
     #[inline(always)]
@@ -163,6 +194,16 @@ macro_rules! all_deltas {
     };
 }
 
+/// What every material says that has no delta lobe.
+macro_rules! no_delta {
+    () => {
+        #[inline]
+        pub(super) fn delta(&self, _uv: Vec2, _given: Vec3, _sampled: Vec3) -> Option<super::DeltaLobe> {
+            None
+        }
+    };
+}
+
 impl Bsdf {
     /// `f(wi -> wo)` for radiance, without cosine, over the non-delta lobes among `lobes`.
     #[inline]
@@ -175,6 +216,30 @@ impl Bsdf {
     #[inline]
     pub fn pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> f32 {
         dispatch!(self, b => b.pdf(uv, given, sampled, lobes))
+    }
+
+    /// The delta lobe that takes `given` to `sampled`, `None` if there is none: what [`Bsdf::sample`] over all lobes would report of it. Asked
+    /// with the roles exchanged it tells of the way back. Directions count as joined within 3 mrad; of two lobes that both join them, the
+    /// one that [`blend::Blend`] names first.
+    pub fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        dispatch!(self, b => b.delta(uv, given, sampled))
+    }
+
+    /// Index of refraction on `sampled`'s side over that on `given`'s side, by lobes that are no deltas; 1 on one side. Where materials of
+    /// different indices are blended, that of the first that light passes.
+    #[inline]
+    pub fn relative_index(&self, given: Vec3, sampled: Vec3) -> f32 {
+        if given.z * sampled.z > 0.0 {
+            return 1.0;
+        }
+        match self {
+            Bsdf::RoughDielectric(b) if given.z > 0.0 => b.eta,
+            Bsdf::RoughDielectric(b) => 1.0 / b.eta,
+            Bsdf::Mask(b) => b.nested.relative_index(given, sampled),
+            Bsdf::Blend(b) if b.first.transmissive() => b.first.relative_index(given, sampled),
+            Bsdf::Blend(b) => b.second.relative_index(given, sampled),
+            _ => 1.0,
+        }
     }
 
     /// The material that faces `w`, one wrapper taken off, and the side it is on: directions are [`twosided::turned`] to it.

@@ -140,6 +140,8 @@ impl Phong {
         false
     }
 
+    no_delta!();
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

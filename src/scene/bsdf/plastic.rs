@@ -1,6 +1,6 @@
 //! A diffuse base under a smooth dielectric coat, black from behind.
 
-use super::{BsdfSample, Lobes, Mode, fresnel};
+use super::{BsdfSample, DeltaLobe, Lobes, Mode, fresnel, mirrored, same_direction};
 use crate::math::{Rgb, warp};
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -145,6 +145,15 @@ impl Plastic {
 
     pub(super) fn anisotropic(&self) -> bool {
         false
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        if given.z <= 0.0 || !same_direction(mirrored(given), sampled) {
+            return None;
+        }
+        let reflectance = self.reflectance(given);
+        let value = self.specular_reflectance.eval(uv) * reflectance;
+        self.p_specular(reflectance, Lobes::All).map(|probability| DeltaLobe { probability, value, eta: 1.0 })
     }
 
     pub(super) fn transmissive(&self) -> bool {

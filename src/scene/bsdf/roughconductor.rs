@@ -106,6 +106,8 @@ impl RoughConductor {
         self.distribution.anisotropic()
     }
 
+    no_delta!();
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

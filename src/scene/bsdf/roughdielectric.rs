@@ -202,6 +202,8 @@ impl RoughDielectric {
         self.distribution.anisotropic()
     }
 
+    no_delta!();
+
     pub(super) fn transmissive(&self) -> bool {
         true
     }

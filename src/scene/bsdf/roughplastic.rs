@@ -198,6 +198,8 @@ impl RoughPlastic {
         false
     }
 
+    no_delta!();
+
     pub(super) fn transmissive(&self) -> bool {
         false
     }

@@ -1,6 +1,6 @@
 //! A thin smooth pane of glass.
 
-use super::{BsdfSample, Lobes, Mode, fresnel};
+use super::{BsdfSample, DeltaLobe, Lobes, Mode, fresnel, mirrored, same_direction};
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
@@ -45,6 +45,19 @@ impl ThinDielectric {
             return 0.0;
         }
         self.specular_transmittance.eval(uv).lerp(self.specular_reflectance.eval(uv), self.reflectance(given)).mean()
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        if given.z == 0.0 {
+            return None;
+        }
+        let reflectance = self.reflectance(given);
+        let reflected = given.z * sampled.z > 0.0;
+        let (w, factor, probability) = match reflected {
+            true => (mirrored(given), &self.specular_reflectance, reflectance),
+            false => (-given, &self.specular_transmittance, 1.0 - reflectance),
+        };
+        same_direction(w, sampled).then(|| DeltaLobe { probability, value: factor.eval(uv) * probability, eta: 1.0 })
     }
 
     pub(super) fn transmissive(&self) -> bool {

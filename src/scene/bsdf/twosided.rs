@@ -1,6 +1,6 @@
 //! One-sided materials made to act on both sides.
 
-use super::{Bsdf, BsdfSample, Lobes, Mode};
+use super::{Bsdf, BsdfSample, DeltaLobe, Lobes, Mode};
 use crate::math::Rgb;
 use glam::{Vec2, Vec3};
 
@@ -72,6 +72,11 @@ impl TwoSided {
 
     pub(super) fn anisotropic(&self) -> bool {
         self.front.anisotropic() || self.back.as_ref().is_some_and(|b| b.anisotropic())
+    }
+
+    pub(super) fn delta(&self, uv: Vec2, given: Vec3, sampled: Vec3) -> Option<DeltaLobe> {
+        let (b, side) = self.facing(given);
+        b.delta(uv, turned(given, side), turned(sampled, side))
     }
 
     pub(super) fn transmissive(&self) -> bool {

@@ -135,9 +135,10 @@ impl Numbers {
     {
         let weights = Weights::<R>::new(sampling);
         let edges = self.segments.len();
-        let share = |i: usize| match self.events[i - 1].merges {
-            true => weights.share(self.events[i - 1].photons.as_()),
-            false => R::zero(),
+        // A surface with lobes of both kinds merges, though not where the path goes by its delta.
+        let share = |i: usize| match self.events[i - 1] {
+            Event { merges, delta, photons, .. } if merges || delta.is_some() => weights.share(photons.as_()),
+            _ => R::zero(),
         };
         let (position, direction): (R, R) = (self.position.as_(), self.direction.as_());
         let emission = Emission { sampled: position * direction, direct: self.direct.as_() };

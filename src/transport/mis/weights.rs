@@ -118,19 +118,19 @@ impl<R: Float + 'static> Weights<R> {
         let density = scatter.fwd * edge.ahead;
         let step = self.power(edge.back / density);
         let back = self.power(scatter.rev);
-        let (last, here, merge_here) = if scatter.delta {
-            // No connection across this edge, none across the edge before, no merge.
+        // At a delta there is no connection across this edge, none across the edge before, and no merge, whatever other lobes the surface has.
+        let (last, here, share_here) = if scatter.delta {
             (R::zero(), R::zero(), R::zero())
         } else {
-            (Self::on(self.techniques.connections) * self.power(density.recip()), from.last, self.power(from.share))
+            (Self::on(self.techniques.connections) * self.power(density.recip()), from.last, from.share)
         };
         Carried {
             last,
             connections: step * (here + back * from.connections),
-            merges: step * (merge_here + back * from.merges),
+            merges: step * (self.power(share_here) + back * from.merges),
             share,
-            shares: from.shares + from.share,
-            mergeable: from.mergeable + Self::on(from.share > R::zero()),
+            shares: from.shares + share_here,
+            mergeable: from.mergeable + Self::on(share_here > R::zero()),
             edges: from.edges + 1,
         }
     }

@@ -85,6 +85,53 @@ fn deltas_are_reversible() {
     }
 }
 
+/// What a delta sample reports, [`Bsdf::delta`] answers for the two directions, from both sides; and nothing for others.
+#[test]
+fn deltas_answer_for_directions() {
+    let mut found = 0;
+    for (name, b) in materials() {
+        let mut s = stream(5);
+        for _ in 0..100 {
+            let given = warp::sphere(pair(&mut s));
+            let elsewhere = warp::sphere(pair(&mut s));
+            let Some(x) = b.sample(UV, given, Mode::Importance, Lobes::All, s.next_1d(), pair(&mut s)) else { continue };
+            assert!(b.delta(UV, given, elsewhere).is_none(), "{name}: {given} to {elsewhere}");
+            if !x.delta {
+                continue;
+            }
+            // Of glass straight on, a hole in it and a second glass cannot be told.
+            if name.starts_with("mask") && x.w.distance(-given) < 0.2 {
+                continue;
+            }
+            let (fwd, rev) = (b.delta(UV, given, x.w).unwrap(), b.delta(UV, x.w, given).unwrap());
+            assert!(close(fwd.probability, x.pdf_fwd, 1e-3) && close(rev.probability, x.pdf_rev, 1e-3), "{name}: {x:?}, {fwd:?}, {rev:?}");
+            assert!(
+                all_close(fwd.value, x.weight * x.pdf_fwd, 1e-3) && all_close(rev.value, fwd.value, 2e-3),
+                "{name}: {x:?}, {fwd:?}, {rev:?}"
+            );
+            assert!(close(fwd.eta, x.eta, 1e-5) && close(fwd.eta * rev.eta, 1.0, 1e-5), "{name}: {x:?}, {fwd:?}, {rev:?}");
+            found += 1;
+        }
+    }
+    assert!(found > 300, "{found}");
+}
+
+/// The index by directions is that of samples.
+#[test]
+fn refraction_has_the_index_of_its_directions() {
+    let mut found = 0;
+    for (name, b) in materials() {
+        let mut s = stream(6);
+        for _ in 0..100 {
+            let given = warp::sphere(pair(&mut s));
+            let Some(x) = b.sample(UV, given, Mode::Radiance, Lobes::Rough(0.0), s.next_1d(), pair(&mut s)) else { continue };
+            assert!(close(b.relative_index(given, x.w), x.eta, 1e-6), "{name}: {x:?}");
+            found += usize::from(x.eta != 1.0);
+        }
+    }
+    assert!(found > 100, "{found}");
+}
+
 #[test]
 fn values_are_reciprocal_and_filters_add_up() {
     for (name, b) in materials() {

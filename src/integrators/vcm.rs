@@ -1,0 +1,157 @@
+//! Vertex connection and merging: one engine for every set of techniques, \[VCM-TR\], [THESIS 2.4].
+//!
+//! An iteration traces light subpaths, connects their vertices to the camera and keeps them; then it traces one camera subpath a pixel, which
+//! hits emitters, samples lights, is connected to the vertices of one light subpath, and merges with those of all that lie near. Weights are
+//! those of `transport::mis`.
+
+mod eye;
+mod iteration;
+mod light;
+mod settings;
+mod technique;
+
+use super::photon_settings::PhotonSettings;
+use super::sppm::eye::Eye;
+use super::{Common, Integrator, IterationStats, MethodError};
+use crate::image::film::Film;
+use crate::photons::Grid;
+use crate::photons::density::{DensityMap, DensitySettings};
+use crate::photons::radius::shrink;
+use crate::samplers::{Drawn, PhotonSampler, Uniform};
+use crate::scene::Scene;
+use crate::scene::hit::Endpoint;
+use crate::targets::points::DepthRange;
+use crate::transport::mis::{Heuristic, Sampling, Techniques, Weights};
+use crate::transport::subpath::{Photons, Subpaths};
+use crate::transport::walk::Tally;
+use iteration::Iteration;
+use light::{Batch, LightSide, Merging};
+
+pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
+pub use technique::{Technique, TechniqueName};
+
+/// The engine bound to a scene.
+struct Engine<'a> {
+    scene: &'a Scene,
+    common: Common,
+    size: (usize, usize),
+    techniques: Techniques,
+    heuristic: Heuristic,
+    photons: PhotonSettings,
+    /// Radius of iteration 0, world units; what it is without merges means nothing.
+    radius: f64,
+    /// What earlier iterations tell of how dense photons lie; `None` for heuristics that do not ask.
+    density: Option<DensityMap>,
+    alone: Option<Technique>,
+}
+
+impl<'a> Engine<'a> {
+    fn new(
+        scene: &'a Scene,
+        size: (usize, usize),
+        common: &Common,
+        techniques: Techniques,
+        heuristic: Heuristic,
+        photons: PhotonSettings,
+        alone: Option<Technique>,
+    ) -> Self {
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone }
+    }
+
+    /// Roughness from which a surface merges.
+    fn threshold(&self) -> f32 {
+        self.photons.roughness_threshold.unwrap_or(0.0)
+    }
+
+    fn sampling(&self, i: u64) -> Sampling {
+        let radius = self.radius * shrink(i, self.photons.alpha);
+        let light_paths = self.photons.photon_count(self.size) as f64;
+        Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
+    }
+
+    /// Iteration `i`, whose weights are made ready; `photons` is the expected number of photons that a merge finds, for heuristics that ask.
+    fn iteration<'w>(&'w self, i: u64, sampling: &Sampling, weights: &'w Weights<f32>, photons: Option<Photons<'w>>) -> Iteration<'a, 'w> {
+        let subpaths =
+            Subpaths { scene: self.scene, weights, roughness_threshold: self.threshold(), photons, classes: self.common.paths.is_some() };
+        Iteration {
+            subpaths,
+            techniques: self.techniques,
+            common: &self.common,
+            index: i,
+            size: self.size,
+            depths: DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) },
+            radius: sampling.radius as f32,
+            merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
+            alone: self.alone,
+        }
+    }
+
+    /// Light subpaths of an iteration, their splats in the film.
+    fn shoot(&self, iteration: &Iteration<'_, '_>, film: &mut Film, stats: &mut IterationStats) -> LightSide {
+        // A path of one edge is a light seen directly, and left to the camera's side.
+        let count = if iteration.depths.max > 1 { self.photons.photon_count(self.size) } else { 0 };
+        let mut sampler = Uniform { seed: self.common.seed };
+        let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
+        let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
+        stats.light_paths += draw.traced;
+        draw.batches.iter().for_each(|batch| stats.count(&batch.tally));
+        if self.techniques.light_tracing {
+            film.add_splats(&draw.batches, count);
+        }
+        LightSide::new(draw)
+    }
+}
+
+impl Integrator for Engine<'_> {
+    fn prepare(&mut self) -> Result<IterationStats, MethodError> {
+        let mut stats = IterationStats::default();
+        if self.techniques.merges {
+            self.radius = match self.photons.radius {
+                Some(radius) => radius,
+                None => {
+                    let eye = Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() };
+                    // Where no pixel's centre shows a surface that merges, hardly any subpath will find one.
+                    let footprint = eye.median_footprint(&mut stats).unwrap_or(1e-3 * self.scene.bounding_sphere().1.max(1e-3));
+                    self.photons.radius_pixels.unwrap_or(1.0) * f64::from(footprint)
+                }
+            };
+        }
+        if self.heuristic.asks_density() && self.techniques.merges {
+            self.density = Some(DensityMap::new(DensitySettings::for_radius(self.radius as f32)));
+        }
+        Ok(stats)
+    }
+
+    fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
+        let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
+        let sampling = self.sampling(i);
+        let weights = Weights::new(&sampling);
+        let mut density = self.density.take();
+        let area = sampling.merge_area() as f32;
+        let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
+        let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
+        let iteration = self.iteration(i, &sampling, &weights, photons);
+        let light = self.shoot(&iteration, film, &mut stats);
+        let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
+        let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
+        film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
+        // Only now, when every weight of the iteration is known.
+        if let (Some(map), Some(merging)) = (&mut density, &merging) {
+            let grid = merging.store.grid();
+            map.insert(grid.len(), |place| grid.position(place));
+        }
+        self.density = density;
+        stats
+    }
+
+    fn stateless(&self) -> bool {
+        !(self.techniques.merges && self.heuristic.asks_density())
+    }
+
+    fn radius(&self) -> Option<f64> {
+        self.techniques.merges.then_some(self.radius)
+    }
+}
+
+#[cfg(test)]
+mod tests;

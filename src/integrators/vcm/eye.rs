@@ -1,0 +1,228 @@
+//! The camera's side: a subpath a pixel, and everything it is joined with.
+
+use super::iteration::Iteration;
+use super::light::{LightSide, LightVertex, Merging};
+use super::technique::Technique;
+use crate::math::Rgb;
+use crate::samplers::{Key, Purpose, Stream};
+use crate::scene::bsdf::Mode;
+use crate::scene::camera::CameraRay;
+use crate::scene::emitter::DirectSample;
+use crate::scene::hit::Hit;
+use crate::transport::class::Letters;
+use crate::transport::merge::{accepts, cosine_ratio};
+use crate::transport::mis::{Carried, Connector, Edge, LightEnd};
+use crate::transport::shading::SurfacePoint;
+use crate::transport::subpath::{Departure, Start, SubpathVertex};
+use crate::transport::survival::Met;
+use crate::transport::walk::{Tally, beyond_emitters};
+use glam::{Vec2, Vec3};
+
+impl<'a> Iteration<'a, '_> {
+    /// What a pixel's camera subpath finds.
+    pub(super) fn pixel(&self, x: usize, y: usize, light: &LightSide, merging: Option<&Merging>, tally: &mut Tally) -> Rgb {
+        let number = y * self.size.0 + x;
+        let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stream();
+        let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
+        let lens = Vec2::from(stream.next_2d());
+        let seen = self.subpaths.scene.camera().ray(film, lens);
+        let mut ray = seen.ray;
+        if self.common.hide_emitters {
+            ray = beyond_emitters(self.subpaths.scene, ray, tally).0;
+        }
+        let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
+        let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
+        let mut sum = Rgb::BLACK;
+        let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
+            if vertex.hit.emitter.is_some() {
+                sum += tally.finite(self.hit(vertex));
+            }
+            let goes_on = vertex.carried.edges < self.depths.max;
+            if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
+                if self.techniques.connections {
+                    let found = self.next_event(vertex, &point, stream, tally);
+                    sum += tally.finite(found);
+                    for (partner, letters) in light.partner(number) {
+                        let found = self.connect(vertex, &point, partner, letters, tally);
+                        sum += tally.finite(found);
+                    }
+                }
+                if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
+                    let found = self.merge(vertex, &point, merging);
+                    sum += tally.finite(found);
+                }
+            }
+            goes_on
+        });
+        if let Some(departure) = departure {
+            sum += tally.finite(self.escape(&departure));
+        }
+        sum
+    }
+
+    /// What the first vertex of a camera subpath carries.
+    pub(super) fn seen(&self, seen: &CameraRay, hit: &Hit, share: f32) -> Carried<f32> {
+        let edge = Edge::between(1.0, seen.ray.d.dot(hit.end.n_g).abs(), seen.end.p.distance_squared(hit.end.p));
+        self.subpaths.weights.from_camera(seen.pdf_pixel.0, edge, share)
+    }
+
+    /// Does emission count that is met after so many edges?
+    fn emission_counts(&self, edges: u32, letters: Letters) -> bool {
+        let hidden = edges == 1 && self.common.hide_emitters;
+        let matches = || self.common.paths.as_ref().is_none_or(|pattern| Letters::default().join(&[], letters, pattern));
+        !hidden && self.depths.contains(edges) && matches()
+    }
+
+    /// A light that was hit.
+    fn hit(&self, vertex: &SubpathVertex<'a>) -> Rgb {
+        let emitted = self.subpaths.scene.emitted(&vertex.hit, -vertex.d, vertex.from.p);
+        if emitted.radiance.is_black() || !self.emission_counts(vertex.carried.edges, vertex.letters) {
+            return Rgb::BLACK;
+        }
+        vertex.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.hit_weight(vertex))
+    }
+
+    pub(super) fn hit_weight(&self, vertex: &SubpathVertex<'a>) -> f32 {
+        if vertex.carried.edges == 1 {
+            return 1.0;
+        }
+        let end = LightEnd::of_hit(self.subpaths.scene, &vertex.hit, vertex.d, &vertex.from);
+        end.map_or(0.0, |end| self.subpaths.weights.emitter_hit(&vertex.carried, &end.emission))
+    }
+
+    /// The light all around.
+    fn escape(&self, departure: &Departure) -> Rgb {
+        let emitted = self.subpaths.scene.escaped(departure.d);
+        if emitted.radiance.is_black() || !self.emission_counts(departure.edges, departure.letters) {
+            return Rgb::BLACK;
+        }
+        departure.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.escape_weight(departure))
+    }
+
+    pub(super) fn escape_weight(&self, departure: &Departure) -> f32 {
+        let Some((from, carried, scatter)) = &departure.last else { return 1.0 };
+        let Some(end) = LightEnd::of_escape(self.subpaths.scene, departure.d, from) else { return 0.0 };
+        let weights = self.subpaths.weights;
+        weights.emitter_hit(&weights.extend(carried, *scatter, end.edge.reversed(), 0.0), &end.emission)
+    }
+
+    /// A light sample.
+    fn next_event<S: Stream>(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, stream: &mut S, tally: &mut Tally) -> Rgb {
+        let scene = self.subpaths.scene;
+        let (u_emitter, u) = (stream.next_1d(), Vec2::from(stream.next_2d()));
+        if !self.depths.contains(vertex.carried.edges + 1) {
+            return Rgb::BLACK;
+        }
+        let Some(sample) = scene.sample_direct(point.end.p, u_emitter, u) else { return Rgb::BLACK };
+        let Some(met) = point.meet(Mode::Radiance, sample.wi) else { return Rgb::BLACK };
+        let cos = point.cosine(Mode::Radiance, sample.wi);
+        let weight = self.next_event_weight(&vertex.carried, point, &sample, &met);
+        let factor = self.weigh(Technique::Connection(1), weight) * cos / sample.pdf.0;
+        let mut value = vertex.throughput * met.f * sample.radiance * factor;
+        if let Some(pattern) = &self.common.paths {
+            value *= self.one_event(pattern, Letters::default(), (point, Mode::Radiance, sample.wi), vertex.letters);
+        }
+        if value.is_black() {
+            return value;
+        }
+        tally.rays += 1;
+        if scene.visible(&point.end, &sample) { value } else { Rgb::BLACK }
+    }
+
+    pub(super) fn next_event_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, sample: &DirectSample, met: &Met) -> f32 {
+        let LightEnd { emission, edge } = LightEnd::of_direct(self.subpaths.scene, sample, &point.end);
+        self.subpaths.weights.next_event(carried, &emission, edge, met.fwd, met.rev)
+    }
+
+    /// A connection to a light vertex.
+    fn connect(
+        &self,
+        vertex: &SubpathVertex<'a>,
+        point: &SurfacePoint<'a>,
+        partner: &LightVertex,
+        letters: Letters,
+        tally: &mut Tally,
+    ) -> Rgb {
+        if !self.depths.contains(vertex.carried.edges + partner.carried.edges + 1) {
+            return Rgb::BLACK;
+        }
+        let other = partner.point(self.subpaths.scene);
+        let Some(Joint { w, distance2, here, there }) = Joint::new(point, &other) else { return Rgb::BLACK };
+        let weight = self.connection_weight(&vertex.carried, point, partner, &Joint { w, distance2, here, there });
+        let cosines = point.cosine(Mode::Radiance, w) * other.cosine(Mode::Importance, -w);
+        let factor = self.weigh(Technique::Connection(partner.carried.edges + 1), weight) * cosines / distance2;
+        let mut value = vertex.throughput * here.f * there.f * partner.flux * factor;
+        if let Some(pattern) = &self.common.paths {
+            let ways = [(&other, Mode::Importance, -w), (point, Mode::Radiance, w)];
+            value *= self.two_events(pattern, letters, ways, vertex.letters);
+        }
+        if value.is_black() {
+            return value;
+        }
+        tally.rays += 1;
+        if self.subpaths.scene.occluded(&point.end, &partner.end) { Rgb::BLACK } else { value }
+    }
+
+    pub(super) fn connection_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, partner: &LightVertex, joint: &Joint) -> f32 {
+        let Joint { w, distance2, here, there } = joint;
+        let edge = Edge::between(w.dot(partner.end.n_g).abs(), w.dot(point.end.n_g).abs(), *distance2);
+        self.subpaths.weights.connection(
+            &Connector { carried: &partner.carried, rev: there.rev, found: here.fwd * edge.back },
+            &Connector { carried, rev: here.rev, found: there.fwd * edge.ahead },
+        )
+    }
+
+    /// Merges with the light vertices around.
+    fn merge(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging) -> Rgb {
+        let mut sum = Rgb::BLACK;
+        let (n_g, n_s) = (point.end.n_g, point.frame.n);
+        merging.store.query(point.end.p, self.radius, |photon, _| {
+            let carried = photon.carried();
+            if !self.depths.contains(vertex.carried.edges + carried.edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
+                return;
+            }
+            let Some(met) = point.meet(Mode::Radiance, photon.wi) else { return };
+            let weight = self.weigh(Technique::Merge(carried.edges), self.merge_weight(&vertex.carried, &carried, &met));
+            if weight == 0.0 {
+                return;
+            }
+            let mut value = met.f * photon.flux * (cosine_ratio(point, photon.wi) * weight);
+            if let Some(pattern) = &self.common.paths {
+                value *= self.one_event(pattern, merging.letters(photon), (point, Mode::Radiance, photon.wi), vertex.letters);
+            }
+            sum += value;
+        });
+        vertex.throughput * sum * self.merge_density
+    }
+
+    #[inline(always)]
+    pub(super) fn merge_weight(&self, camera: &Carried<f32>, light: &Carried<f32>, met: &Met) -> f32 {
+        self.subpaths.weights.merge(light, met.fwd, camera, met.rev)
+    }
+}
+
+/// Two surface points, one of a camera subpath and one of a light subpath, asked about the edge between them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Joint {
+    /// Unit direction from the camera's point to the light's.
+    pub(super) w: Vec3,
+    pub(super) distance2: f32,
+    /// What the camera's point says, and the light's.
+    pub(super) here: Met,
+    pub(super) there: Met,
+}
+
+impl Joint {
+    /// `None` where one of them does not scatter along the edge.
+    pub(super) fn new(point: &SurfacePoint<'_>, other: &SurfacePoint<'_>) -> Option<Self> {
+        let between = other.end.p - point.end.p;
+        let distance2 = between.length_squared();
+        if distance2 == 0.0 {
+            return None;
+        }
+        let w = between / distance2.sqrt();
+        let here = point.meet(Mode::Radiance, w)?;
+        let there = other.meet(Mode::Importance, -w)?;
+        Some(Self { w, distance2, here, there })
+    }
+}

@@ -1,0 +1,297 @@
+//! The light's side: light subpaths, the vertices they leave, and their connections to the camera.
+
+use super::iteration::Iteration;
+use super::technique::Technique;
+use crate::image::film::Splat;
+use crate::math::{Frame, Rgb};
+use crate::photons::Store;
+use crate::samplers::{Draw, Drawn, Key, LightPathSpace, Purpose, Stream};
+use crate::scene::ShapeId;
+use crate::scene::bsdf::Mode;
+use crate::scene::camera::CameraConnection;
+use crate::scene::hit::Endpoint;
+use crate::transport::class::Letters;
+use crate::transport::mis::{Carried, Connector, LightEnd};
+use crate::transport::shading::SurfacePoint;
+use crate::transport::subpath::{Start, SubpathVertex};
+use crate::transport::survival::Met;
+use crate::transport::walk::Tally;
+use glam::{Vec2, Vec3};
+
+/// A vertex of a light subpath whose surface has a lobe that is no delta: 116 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightVertex {
+    pub(super) end: Endpoint,
+    /// Shading normal and first tangent; the second is their product.
+    n_s: Vec3,
+    s: Vec3,
+    uv: Vec2,
+    shape: ShapeId,
+    /// Unit direction towards where the light came from.
+    pub(super) wi: Vec3,
+    /// Flux that arrives, of the path alone: its mean over paths is the power that arrives here.
+    pub(super) flux: Rgb,
+    pub(super) carried: Carried<f32>,
+}
+
+impl LightVertex {
+    pub(super) fn new(vertex: &SubpathVertex<'_>, point: &SurfacePoint<'_>) -> Self {
+        let SurfacePoint { end, frame, uv, given, .. } = *point;
+        let (flux, carried) = (vertex.throughput, vertex.carried);
+        Self { end, n_s: frame.n, s: frame.s, uv, shape: vertex.hit.shape, wi: given, flux, carried }
+    }
+
+    /// Ready to scatter.
+    #[inline]
+    pub(super) fn point<'a>(&self, scene: &'a crate::scene::Scene) -> SurfacePoint<'a> {
+        let frame = Frame { s: self.s, t: self.n_s.cross(self.s), n: self.n_s };
+        let (bsdf, given) = (scene.bsdf(self.shape), self.wi);
+        SurfacePoint { bsdf, end: self.end, frame, uv: self.uv, given, given_local: frame.to_local(given) }
+    }
+}
+
+/// A traced light subpath; a buffer that is filled again and again.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LightSubpath {
+    vertices: Vec<LightVertex>,
+    /// Events before each vertex; empty unless classes are kept.
+    letters: Vec<Letters>,
+    tally: Tally,
+}
+
+impl LightPathSpace for Iteration<'_, '_> {
+    type Path = LightSubpath;
+
+    /// Coordinates: one for the choice of emitter, two for the position, two for the direction, then those of the walk.
+    fn trace<S: Stream>(&self, stream: &mut S, path: &mut LightSubpath) {
+        let LightSubpath { vertices, letters, tally } = path;
+        vertices.clear();
+        letters.clear();
+        *tally = Tally::default();
+        let u_emitter = stream.next_1d();
+        let u_position = Vec2::from(stream.next_2d());
+        let u_direction = Vec2::from(stream.next_2d());
+        let scene = self.subpaths.scene;
+        let Some(emission) = scene.sample_emission(u_emitter, u_position, u_direction) else { return };
+        if emission.flux.is_black() {
+            return;
+        }
+        let start = Start { ray: emission.end.ray(emission.d), from: emission.end, throughput: emission.flux };
+        let first = |hit: &crate::scene::hit::Hit, share: f32| {
+            let end = LightEnd::of_emission(scene, &emission, &hit.end);
+            self.subpaths.weights.from_light(&end.emission, end.edge, share)
+        };
+        // One more edge joins a vertex to the camera's side; a merge vertex counts its edges in 16 bits.
+        let most = self.depths.max.saturating_sub(1).min(u32::from(u16::MAX));
+        self.subpaths.walk(Mode::Importance, start, stream, tally, first, |vertex, _, _| {
+            if let Some(point) = vertex.point.filter(|point| point.bsdf.max_roughness() > 0.0) {
+                vertices.push(LightVertex::new(vertex, &point));
+                if self.subpaths.classes {
+                    letters.push(vertex.letters);
+                }
+            }
+            vertex.carried.edges < most
+        });
+    }
+
+    /// Rung 0 alone.
+    fn targets(&self, _path: &LightSubpath, values: &mut [f64]) {
+        values.fill(1.0);
+    }
+}
+
+/// What a batch of light subpaths leaves.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    vertices: Vec<LightVertex>,
+    letters: Vec<Letters>,
+    /// Where each path's vertices end.
+    ends: Vec<u32>,
+    splats: Vec<Splat>,
+    pub(super) tally: Tally,
+}
+
+impl AsRef<[Splat]> for Batch {
+    fn as_ref(&self) -> &[Splat] {
+        &self.splats
+    }
+}
+
+/// All light subpaths of an iteration, in the order of their numbers.
+#[derive(Debug, Default)]
+pub(super) struct LightSide {
+    pub(super) batches: Vec<Batch>,
+    /// Number of the first path of each batch.
+    firsts: Vec<usize>,
+    paths: usize,
+}
+
+impl LightSide {
+    pub(super) fn new(draw: Draw<Batch>) -> Self {
+        let mut batches = draw.batches;
+        let (mut firsts, mut paths) = (Vec::with_capacity(batches.len()), 0);
+        for batch in &mut batches {
+            // What is in the film is done with.
+            batch.splats = Vec::new();
+            firsts.push(paths);
+            paths += batch.ends.len();
+        }
+        Self { batches, firsts, paths }
+    }
+
+    /// The vertices that camera subpath number `pixel` is connected to, each with the events before it.
+    pub(super) fn partner(&self, pixel: usize) -> impl Iterator<Item = (&LightVertex, Letters)> {
+        let path = pixel % self.paths.max(1);
+        let number = self.firsts.partition_point(|&first| first <= path).saturating_sub(1);
+        let found = self.batches.get(number).map(|batch| {
+            let place = path - self.firsts[number];
+            let start = place.checked_sub(1).map_or(0, |before| batch.ends[before] as usize);
+            (batch, start..batch.ends[place] as usize)
+        });
+        found
+            .into_iter()
+            .flat_map(|(batch, range)| range.map(move |i| (&batch.vertices[i], batch.letters.get(i).copied().unwrap_or_default())))
+    }
+}
+
+/// A light vertex as merges need it: 60 bytes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MergeVertex {
+    /// Unit geometric normal.
+    pub(super) n_g: Vec3,
+    /// Unit direction towards where the light came from.
+    pub(super) wi: Vec3,
+    pub(super) flux: Rgb,
+    last: f32,
+    connections: f32,
+    merges: f32,
+    shares: f32,
+    mergeable: u16,
+    edges: u16,
+    /// Its number before sorting: where its class is.
+    place: u32,
+}
+
+impl MergeVertex {
+    fn new(vertex: &LightVertex, place: u32) -> Self {
+        let LightVertex { end, wi, flux, carried, .. } = *vertex;
+        let Carried { last, connections, merges, shares, mergeable, edges, .. } = carried;
+        // Whole numbers; walks are far shorter than these can count.
+        let (mergeable, edges) = (mergeable as u16, edges.min(u32::from(u16::MAX)) as u16);
+        Self { n_g: end.n_g, wi, flux, last, connections, merges, shares, mergeable, edges, place }
+    }
+
+    /// What its vertex carried, but for the share, which is the camera vertex's where the two merge.
+    #[inline(always)]
+    pub(super) fn carried(&self) -> Carried<f32> {
+        let Self { last, connections, merges, shares, mergeable, edges, .. } = *self;
+        Carried { last, connections, merges, share: 0.0, shares, mergeable: f32::from(mergeable), edges: u32::from(edges) }
+    }
+}
+
+/// The light vertices that camera subpaths merge with.
+pub(super) struct Merging {
+    pub(super) store: Store<MergeVertex>,
+    /// Events before each vertex, by [`MergeVertex::place`]; empty unless classes are kept.
+    letters: Vec<Letters>,
+}
+
+impl Merging {
+    /// Sorts all vertices that may merge into cells of side `cell`.
+    pub(super) fn new(light: &LightSide, cell: f32) -> Self {
+        let mut places: Vec<[u32; 2]> = Vec::new();
+        let mut letters = Vec::new();
+        for (number, batch) in light.batches.iter().enumerate() {
+            for (i, _) in batch.vertices.iter().enumerate().filter(|(_, vertex)| vertex.carried.share > 0.0) {
+                places.push([number as u32, i as u32]);
+                letters.extend(batch.letters.get(i));
+            }
+        }
+        let vertex = |i: usize| {
+            let [batch, place] = places[i].map(|n| n as usize);
+            &light.batches[batch].vertices[place]
+        };
+        let store = Store::build(places.len(), |i| vertex(i).end.p, |i| MergeVertex::new(vertex(i), i as u32), cell);
+        Self { store, letters }
+    }
+
+    /// Events before a vertex.
+    pub(super) fn letters(&self, vertex: &MergeVertex) -> Letters {
+        self.letters.get(vertex.place as usize).copied().unwrap_or_default()
+    }
+}
+
+impl Iteration<'_, '_> {
+    /// Keeps a light subpath, and what it brings to the camera.
+    pub(super) fn keep(&self, batch: &mut Batch, path: &LightSubpath, drawn: &[Drawn]) {
+        batch.tally.add(&path.tally);
+        let index = drawn.first().map_or(0, |drawn| drawn.index);
+        if self.techniques.light_tracing {
+            let key = Key { seed: self.common.seed, iteration: self.index, index: self.pixels() + index, purpose: Purpose::Connect };
+            let mut stream = self.subpaths.scene.camera().description().lens.map(|_| key.stream());
+            for (i, vertex) in path.vertices.iter().enumerate() {
+                let lens = stream.as_mut().map_or(Vec2::ZERO, |stream| Vec2::from(stream.next_2d()));
+                let letters = path.letters.get(i).copied().unwrap_or_default();
+                batch.splats.extend(self.splat(vertex, letters, lens, &mut batch.tally));
+            }
+        }
+        if self.keeps_vertices() {
+            batch.vertices.extend_from_slice(&path.vertices);
+            batch.letters.extend_from_slice(&path.letters);
+        }
+        batch.ends.push(batch.vertices.len() as u32);
+    }
+
+    /// A light vertex connected to the camera.
+    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, tally: &mut Tally) -> Option<Splat> {
+        let edges = vertex.carried.edges + 1;
+        if !self.depths.contains(edges) {
+            return None;
+        }
+        let connection = self.subpaths.scene.camera().connect(&vertex.end, lens)?;
+        let point = vertex.point(self.subpaths.scene);
+        let met = point.meet(Mode::Importance, connection.wo)?;
+        let density = connection.pdf_pixel.0 / connection.distance2;
+        let weight = self.weigh(Technique::Splat, self.splat_weight(vertex, &connection, &met));
+        if weight == 0.0 {
+            return None;
+        }
+        let mut value = vertex.flux * met.f * (point.cosine(Mode::Importance, connection.wo) * density * weight);
+        if let Some(pattern) = &self.common.paths {
+            value *= self.one_event(pattern, letters, (&point, Mode::Importance, connection.wo), Letters::default());
+        }
+        if value.is_black() || !self.camera_sees(vertex, &connection, tally) {
+            return None;
+        }
+        let (x, y) = (connection.film.x as usize, connection.film.y as usize);
+        Some(Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) })
+    }
+
+    /// Weight of a light vertex connected to the camera.
+    pub(super) fn splat_weight(&self, vertex: &LightVertex, connection: &CameraConnection, met: &Met) -> f32 {
+        let found = connection.pdf_pixel.0 * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
+        self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found })
+    }
+
+    /// Is nothing between a light vertex and the camera that the camera does not look through?
+    fn camera_sees(&self, vertex: &LightVertex, connection: &CameraConnection, tally: &mut Tally) -> bool {
+        let scene = self.subpaths.scene;
+        tally.rays += 1;
+        if !self.common.hide_emitters {
+            return scene.camera_sees(&vertex.end, connection);
+        }
+        // The camera's first edge passes emitters, and shows none.
+        let shines = |shape: ShapeId| scene.shapes().get(shape.0 as usize).is_some_and(|shape| shape.emitter.is_some());
+        let mut ray = connection.near.segment(&vertex.end);
+        loop {
+            match scene.intersect(&ray) {
+                None => return !shines(vertex.shape),
+                Some(hit) if hit.emitter.is_none() => return false,
+                Some(hit) => {
+                    tally.rays += 1;
+                    ray = hit.end.segment(&vertex.end);
+                }
+            }
+        }
+    }
+}

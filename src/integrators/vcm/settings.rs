@@ -1,0 +1,134 @@
+//! What `vcm` and `bdpt` are told.
+
+use super::super::photon_settings::{GlossyPaths, PhotonSettings, SamplerName};
+use super::super::{Common, Integrator, MethodError, Settings};
+use super::Engine;
+use super::technique::{Technique, TechniqueName};
+use crate::scene::Scene;
+use crate::transport::mis::{Heuristic, MergeWeights, Techniques};
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+/// How merges are weighed against connections.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MergeWeightsName {
+    /// Balance heuristic
+    #[default]
+    Balance,
+    /// Power heuristic with the exponent --beta
+    Power,
+    /// Merges count for less where many photons lie (Jendersie and Grosch 2018)
+    VcmPlus,
+    /// The same relative to the whole path's merges
+    VcmStar,
+}
+
+/// Settings of `vcm`.
+#[derive(Args, Clone, Debug, Serialize, Deserialize)]
+#[serde(default)]
+pub struct VcmSettings {
+    /// Techniques that take part
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["vc", "vm", "lt"], value_name = "LIST")]
+    pub techniques: Vec<TechniqueName>,
+    /// How merges are weighed against connections
+    #[arg(long, value_enum, default_value_t, value_name = "HOW")]
+    pub merge_weights: MergeWeightsName,
+    /// Exponent of the heuristic; anything but 1 with balance is refused
+    #[arg(long, default_value_t = 1.0, value_name = "B")]
+    pub beta: f64,
+    /// One technique, with weight 1: for tests.
+    #[arg(long, hide = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alone: Option<Technique>,
+    /// Photon options.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub photons: PhotonSettings,
+}
+
+impl Default for VcmSettings {
+    fn default() -> Self {
+        Self {
+            techniques: vec![TechniqueName::Vc, TechniqueName::Vm, TechniqueName::Lt],
+            merge_weights: MergeWeightsName::Balance,
+            beta: 1.0,
+            alone: None,
+            photons: PhotonSettings::default(),
+        }
+    }
+}
+
+impl VcmSettings {
+    fn set(&self) -> Result<Techniques, String> {
+        let count = |name| self.techniques.iter().filter(|&&t| t == name).count();
+        let [vc, vm, lt] = [TechniqueName::Vc, TechniqueName::Vm, TechniqueName::Lt].map(count);
+        if self.techniques.is_empty() || vc.max(vm).max(lt) > 1 {
+            return Err("--techniques needs one or more of vc, vm, lt, each at most once".into());
+        }
+        Ok(Techniques { connections: vc > 0, merges: vm > 0, light_tracing: lt > 0 })
+    }
+
+    fn heuristic(&self) -> Result<Heuristic, String> {
+        let merges = match self.merge_weights {
+            MergeWeightsName::Balance => MergeWeights::Balance,
+            MergeWeightsName::Power => MergeWeights::Power,
+            MergeWeightsName::VcmPlus => MergeWeights::VcmPlus,
+            MergeWeightsName::VcmStar => MergeWeights::VcmStar,
+        };
+        Heuristic::new(merges, self.beta).map_err(|e| e.to_string())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        self.photons.validate()?;
+        uniform(self.photons.sampler)?;
+        if self.photons.glossy_paths != GlossyPaths::Keep {
+            return Err("--glossy-paths drop is for sppm: here every path is counted by some technique".into());
+        }
+        Ok(())
+    }
+}
+
+/// The samplers that draw light paths for connections so far.
+fn uniform(sampler: SamplerName) -> Result<(), String> {
+    if sampler == SamplerName::Uniform {
+        return Ok(());
+    }
+    Err("only --sampler uniform draws light paths for connections as yet".into())
+}
+
+impl Settings for VcmSettings {
+    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
+        let settings = |message| MethodError::Settings { method: "vcm", message };
+        self.check().map_err(settings)?;
+        let (techniques, heuristic) = (self.set().map_err(settings)?, self.heuristic().map_err(settings)?);
+        let alone = self.alone;
+        Ok(Box::new(Engine::new(scene, size, common, techniques, heuristic, self.photons.clone(), alone)))
+    }
+}
+
+/// Settings of `bdpt`: the engine without merges.
+#[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct BdptSettings {
+    /// Photon sampler
+    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
+    pub sampler: SamplerName,
+    /// Light paths per iteration; default one a pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photons: Option<u64>,
+    /// One technique, with weight 1: for tests.
+    #[arg(long, hide = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alone: Option<Technique>,
+}
+
+impl Settings for BdptSettings {
+    fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
+        let photons = PhotonSettings { sampler: self.sampler, photons: self.photons, ..PhotonSettings::default() };
+        let checked = photons.validate().and_then(|()| uniform(self.sampler));
+        checked.map_err(|message| MethodError::Settings { method: "bdpt", message })?;
+        Ok(Box::new(Engine::new(scene, size, common, Techniques::BDPT, Heuristic::default(), photons, self.alone)))
+    }
+}

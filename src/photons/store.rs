@@ -1,0 +1,53 @@
+//! What light left at surfaces, in the order of a grid.
+
+use super::grid::Grid;
+use crate::math::Rgb;
+use glam::Vec3;
+
+/// A photon but for its position: flux that arrived at a surface point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photon {
+    /// Unit geometric normal there.
+    pub n_g: Vec3,
+    /// Unit direction towards the light, world space.
+    pub wi: Vec3,
+    /// Flux carried (a path's, not yet divided by the number of paths), times its weight within its stratum.
+    pub flux: Rgb,
+    /// Path edges from the light to here.
+    pub depth: u16,
+    /// The sampler's stratum that drew the path.
+    pub stratum: u16,
+}
+
+/// Items at positions: the grid that finds them, and the items in its order.
+#[derive(Debug)]
+pub struct Store<T> {
+    grid: Grid,
+    items: Vec<T>,
+}
+
+impl<T: Send> Store<T> {
+    /// Sorts `count` items, whose positions and contents are asked for by number, into cells of side `cell`: see [`Grid::build`].
+    pub fn build(count: usize, position: impl Fn(usize) -> Vec3 + Sync, item: impl Fn(usize) -> T + Sync, cell: f32) -> Self {
+        let (grid, order) = Grid::build(count, position, cell);
+        Self { grid, items: order.gather(item) }
+    }
+}
+
+impl<T> Store<T> {
+    /// The grid of the positions.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The items in the grid's order.
+    pub fn items(&self) -> &[T] {
+        &self.items
+    }
+
+    /// Calls `visit` with every item closer than `radius` to `p` and its squared distance: see [`Grid::query`].
+    #[inline]
+    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(&T, f32)) {
+        self.grid.query(p, radius, |place, distance2| visit(&self.items[place], distance2));
+    }
+}

@@ -1,0 +1,118 @@
+//! Both densities of a pair of directions, with a Russian roulette that both ends of a path can compute.
+//!
+//! Weights of bidirectional methods need every density a second time, from the other end of the path. A roulette that asks how long the walk is,
+//! or what its throughput is, cannot tell. This one asks the surface and the two directions alone: a walk survives with the share
+//! of light that its scattering keeps, `f cos / pdf` (largest component), at most [`CEILING`]. So a density times its survival is
+//!
+//! ```text
+//! min(CEILING pdf, max(f) cos)
+//! ```
+//!
+//! which needs no walk that drew it. Light that goes into a denser medium is not lost, though its radiance shrinks: for walks from the camera
+//! `f cos` is multiplied by the squared relative index. The adjoint factor of shading normals has no part in it.
+
+use super::mis::Scatter;
+use super::shading::{SurfacePoint, sides_agree};
+use crate::math::Rgb;
+use crate::scene::bsdf::{Lobes, Mode};
+use glam::{Vec2, Vec3};
+
+/// Largest survival, so that light caught in lossless glass or between mirrors ends too: after fifty events on average.
+pub const CEILING: f32 = 0.98;
+
+/// A direction that a surface point is asked about: its value, and the densities from both ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// `f(wi -> wo)` over all lobes that are no deltas, without cosine.
+    pub f: Rgb,
+    /// Density per steradian of the direction, for the walk that came here; survival included.
+    pub fwd: f32,
+    /// Density per steradian of the direction this walk came from, for one that comes along the direction asked about; survival included.
+    pub rev: f32,
+}
+
+/// A walk goes on.
+#[derive(Clone, Copy, Debug)]
+pub struct Onward {
+    /// Unit direction.
+    pub d: Vec3,
+    /// Factor on the throughput: `f cos / pdf`, the adjoint factor in importance mode, over the survival.
+    pub weight: Rgb,
+    /// Densities in the form weights ask for.
+    pub scatter: Scatter<f32>,
+}
+
+impl SurfacePoint<'_> {
+    /// What the point says about going along the unit direction `w`; `None` where it does not scatter there.
+    #[inline]
+    pub fn meet(&self, mode: Mode, w: Vec3) -> Option<Met> {
+        if !sides_agree(w, self.end.n_g, self.frame.n) {
+            return None;
+        }
+        let (given, sampled) = (self.given_local, self.frame.to_local(w));
+        let (f, pdf_fwd) = self.bsdf.eval_pdf(self.uv, given, sampled, mode, Lobes::All);
+        if f.is_black() {
+            return None;
+        }
+        let pdf_rev = self.bsdf.pdf(self.uv, sampled, given, Lobes::All);
+        let (fwd, rev) =
+            with_survival(mode, f.max_component(), [pdf_fwd, pdf_rev], self.square_index(given, sampled), [sampled.z, given.z]);
+        Some(Met { f, fwd, rev })
+    }
+
+    /// The next direction of a walk; `None` where it ends: absorbed, sides that disagree, or the roulette lost. Coordinates are in [0, 1).
+    #[inline]
+    pub fn scatter(&self, mode: Mode, u_lobe: f32, u: Vec2, u_survive: f32) -> Option<Onward> {
+        let (s, d) = self.draw(mode, Lobes::All, u_lobe, u)?;
+        let index2 = if s.delta { s.eta * s.eta } else { self.square_index(self.given_local, s.w) };
+        let largest = s.weight.max_component();
+        let kept = match mode {
+            Mode::Radiance => largest * index2,
+            Mode::Importance => largest,
+        };
+        let survival = kept.min(CEILING);
+        if u_survive >= survival {
+            return None;
+        }
+        let scatter = if s.delta {
+            let (fwd, rev) = (s.pdf_fwd * survival, (CEILING * s.pdf_rev).min(kept * s.pdf_fwd));
+            match s.eta {
+                1.0 => Scatter::reflection(fwd, rev),
+                eta => Scatter::refraction(fwd, rev, self.given_local.z.abs(), s.w.z.abs(), eta),
+            }
+        } else {
+            // What a value would be, from the weight.
+            let value = largest * s.pdf_fwd / s.w.z.abs();
+            let (fwd, rev) = with_survival(mode, value, [s.pdf_fwd, s.pdf_rev], index2, [s.w.z, self.given_local.z]);
+            Scatter::rough(fwd, rev)
+        };
+        let adjoint = match mode {
+            Mode::Radiance => 1.0,
+            Mode::Importance => self.adjoint(d),
+        };
+        Some(Onward { d, weight: s.weight * (adjoint / survival), scatter })
+    }
+
+    /// The squared index of refraction on `sampled`'s side over that on `given`'s.
+    #[inline(always)]
+    fn square_index(&self, given: Vec3, sampled: Vec3) -> f32 {
+        if given.z * sampled.z > 0.0 {
+            return 1.0;
+        }
+        let index = self.bsdf.relative_index(given, sampled);
+        index * index
+    }
+}
+
+/// Densities of the direction sampled and of the one given, with survival: `value` is the largest component of `f`, `index2` the squared index
+/// on the sampled side over that on the given side, `cosines` those of the sampled and the given direction with the shading normal.
+#[inline(always)]
+pub(super) fn with_survival(mode: Mode, value: f32, pdfs: [f32; 2], index2: f32, cosines: [f32; 2]) -> (f32, f32) {
+    let (sampled, given) = (value * cosines[0].abs(), value * cosines[1].abs());
+    // The walk from the camera gains the index of the side it goes to over that of the side it came from.
+    let (kept_fwd, kept_rev) = match mode {
+        Mode::Radiance => (sampled * index2, given),
+        Mode::Importance => (sampled, given / index2),
+    };
+    ((CEILING * pdfs[0]).min(kept_fwd), (CEILING * pdfs[1]).min(kept_rev))
+}
