@@ -56,11 +56,16 @@ fn indices_are_unique_and_every_step_is_handed_out_once() {
     for (rungs, count) in [(1, 1000), (2, 999), (3, 17), (4, 5003)] {
         let mut ladder = Ladder::new(settings(3, rungs));
         let draw = everything(&mut ladder, &Square::default(), 0, count);
-        let mut indices: Vec<u64> = draw.batches.iter().flatten().map(|(_, drawn)| drawn.index).collect();
+        let mut indices: Vec<(u64, usize)> = draw.batches.iter().flatten().map(|(_, drawn)| (drawn.index, drawn.stratum)).collect();
         let steps: u64 = draw.batches.iter().flatten().map(|(_, drawn)| u64::from(drawn.repeats)).sum();
         assert_eq!(steps, count, "{rungs} rungs");
         indices.sort_unstable();
-        assert!(indices.windows(2).all(|pair| pair[0] < pair[1]) && indices.last() < Some(&count));
+        assert!(indices.windows(2).all(|pair| pair[0] < pair[1]) && indices.last() < Some(&(count, 0)));
+        // Entries of one index are one path.
+        let mut paths: Vec<(u64, [u32; 2])> = draw.batches.iter().flatten().map(|(p, drawn)| (drawn.index, p.map(f32::to_bits))).collect();
+        paths.sort_unstable();
+        paths.dedup();
+        assert!(paths.windows(2).all(|pair| pair[0].0 < pair[1].0));
         assert_eq!(draw.batches.len(), 16);
         let reported: u64 = ladder.report().rungs.iter().map(|rung| rung.steps).sum();
         assert_eq!(reported, count);

@@ -1,7 +1,7 @@
 //! Paths that use as many coordinates as their coordinates say: states hold the used ones, the rest is drawn afresh.
 
 use crate::kit::{FAMILY, chi_squared, everything, settings};
-use isophote_samplers::{Ladder, LadderSettings, LightPathSpace, Stream};
+use isophote_samplers::{Key, Ladder, LadderSettings, LightPathSpace, Purpose, Stream};
 
 const LONGEST: usize = 8;
 const GO_ON: f64 = 0.7;
@@ -66,7 +66,8 @@ fn law_of_length(rung: usize) -> Vec<f64> {
     (0..=LONGEST).map(|l| if l == 0 { 0.0 } else { mass(l) }).collect()
 }
 
-/// Steps between two points that are taken for independent: several autocorrelation times of this toy.
+/// One step in so many is looked at: several autocorrelation times of this toy. Which one is random: paths are handed out when they are left,
+/// for all their steps at once, and when they are left goes by turns of exchange, so a fixed stride favours some of them.
 const THINNING: usize = 60;
 
 #[test]
@@ -75,13 +76,18 @@ fn lengths_and_coordinates_keep_their_laws() {
     let mut lengths = [[0.0; LONGEST + 1]; 3];
     // By rung, length, vertex and bin.
     let mut values = vec![[[[0.0; 8]; LONGEST]; LONGEST + 1]; 3];
+    let mut random = Key { seed: 5, iteration: 0, index: 0, purpose: Purpose::Test }.stream();
     for batch in draw.batches {
         let mut step = [0usize; 3];
+        let mut taken = [0usize; 3];
         for (walk, drawn) in batch {
             let c = drawn.stratum;
             for _ in 0..drawn.repeats {
                 step[c] += 1;
-                if c > 0 && step[c] % THINNING == 0 {
+                if (step[c] - 1) % THINNING == 0 {
+                    taken[c] = step[c] + (f64::from(random.next_1d()) * THINNING as f64) as usize;
+                }
+                if c > 0 && step[c] == taken[c] {
                     lengths[c][walk.length] += 1.0;
                     for (vertex, value) in walk.values[..walk.length].iter().enumerate() {
                         values[c][walk.length][vertex][(value * 8.0) as usize] += 1.0;
