@@ -57,15 +57,14 @@ impl Cells {
     /// The cell's bucket. Cells along x within a region have buckets in sequence.
     #[inline(always)]
     pub(super) fn bucket(&self, cell: IVec3) -> u32 {
-        let region = cell >> REGION;
-        let [x, y, z] = [(region.x, FACTORS[0]), (region.y, FACTORS[1]), (region.z, FACTORS[2])].map(|(c, f)| (c as u32).wrapping_mul(f));
-        let h = x.wrapping_add(y).wrapping_add(z);
-        // The low bits shall depend on every bit.
-        let h = (h ^ (h >> 15)).wrapping_mul(MIX);
-        let hash = (h ^ (h >> 14)) & self.mask;
-        let place = cell & ((1 << REGION) - 1);
-        let place = (place.x | place.y << REGION | place.z << (2 * REGION)) as u32;
-        hash << (3 * REGION) | (place ^ (h >> 21 & FLIPS))
+        self.row(cell.y, cell.z).bucket(cell.x)
+    }
+
+    /// All cells at a `y` and a `z`.
+    #[inline(always)]
+    pub(super) fn row(&self, y: i32, z: i32) -> Row {
+        let sum = share(y, FACTORS[1]).wrapping_add(share(z, FACTORS[2]));
+        Row { sum, place: place(y) << REGION | place(z) << (2 * REGION), mask: self.mask }
     }
 
     /// Buckets of a cell and of the seven after it along x, y, z and their sums, x first: what [`Cells::bucket`] says of each.
@@ -81,6 +80,39 @@ impl Cells {
         let buckets: u32x8 = (hash << (3 * REGION)) | (place ^ ((h >> 21) & u32x8::splat(FLIPS)));
         buckets.to_array()
     }
+}
+
+/// A row of cells along x.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// What y and z add to a region's hash.
+    sum: u32,
+    place: u32,
+    mask: u32,
+}
+
+impl Row {
+    /// The bucket of the row's cell at `x`.
+    #[inline(always)]
+    pub(super) fn bucket(&self, x: i32) -> u32 {
+        let h = self.sum.wrapping_add(share(x, FACTORS[0]));
+        // The low bits shall depend on every bit.
+        let h = (h ^ (h >> 15)).wrapping_mul(MIX);
+        let hash = (h ^ (h >> 14)) & self.mask;
+        hash << (3 * REGION) | ((self.place | place(x)) ^ (h >> 21 & FLIPS))
+    }
+}
+
+/// What a coordinate adds to its region's hash.
+#[inline(always)]
+fn share(coordinate: i32, factor: u32) -> u32 {
+    ((coordinate >> REGION) as u32).wrapping_mul(factor)
+}
+
+/// A coordinate within its region.
+#[inline(always)]
+fn place(coordinate: i32) -> u32 {
+    (coordinate & ((1 << REGION) - 1)) as u32
 }
 
 /// Corners of a cube, coordinate by coordinate.

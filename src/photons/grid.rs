@@ -100,37 +100,57 @@ impl Grid {
         let reach = Vec3::splat(radius * (1.0 + 1e-6));
         let (low, high) = (self.cells.of(p - reach), self.cells.of(p + reach));
         let (from, radius2) = (Vec3x8::splat(p), f32x8::splat(radius * radius));
-        let near = high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all();
-        for z in low.z..=high.z {
-            for y in low.y..=high.y {
+        if high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all() {
+            self.each_run(low, high, |_, run| self.visit_run(run, from, radius2, &mut visit));
+        } else {
+            self.each_run(low, high, |[first, last], run| {
+                self.visit_run(run, from, radius2, &mut |place, distance2| {
+                    let cell = self.cells.of(self.position(place));
+                    if cell.cmpge(first).all() && cell.cmple(last).all() {
+                        visit(place, distance2);
+                    }
+                });
+            });
+        }
+    }
+
+    /// The cells from `low` to `high`, run by run: the first and the last cell, and where their places begin and end.
+    #[inline(always)]
+    fn each_run(&self, low: IVec3, high: IVec3, mut of_run: impl FnMut([IVec3; 2], (usize, usize))) {
+        let mut z = low.z;
+        loop {
+            let mut y = low.y;
+            loop {
+                let row = self.cells.row(y, z);
                 let mut x = low.x;
                 loop {
                     let last = end_of_row(x).min(high.x);
-                    let bucket = self.cells.bucket(IVec3::new(x, y, z)) as usize;
+                    let bucket = row.bucket(x) as usize;
                     let run = (self.starts[bucket] as usize, self.starts[bucket + (last - x) as usize + 1] as usize);
-                    if near {
-                        self.visit_run(run, from, radius2, &mut visit);
-                    } else {
-                        let (first, last) = (IVec3::new(x, y, z), IVec3::new(last, y, z));
-                        self.visit_run(run, from, radius2, &mut |place, distance2| {
-                            let cell = self.cells.of(self.position(place));
-                            if cell.cmpge(first).all() && cell.cmple(last).all() {
-                                visit(place, distance2);
-                            }
-                        });
-                    }
-                    if last == high.x {
+                    of_run([IVec3::new(x, y, z), IVec3::new(last, y, z)], run);
+                    if last >= high.x {
                         break;
                     }
                     x = last + 1;
                 }
+                if y >= high.y {
+                    break;
+                }
+                y += 1;
             }
+            if z >= high.z {
+                break;
+            }
+            z += 1;
         }
     }
 
     /// Visits those of the places `start..end` that are closer than the root of `radius2`.
     #[inline(always)]
     fn visit_run(&self, (start, end): (usize, usize), from: Vec3x8, radius2: f32x8, visit: &mut impl FnMut(usize, f32)) {
+        if start == end {
+            return;
+        }
         let mut place = start & !7;
         while place < end {
             let between = self.lanes[place / 8] - from;

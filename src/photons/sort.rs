@@ -1,6 +1,7 @@
 //! A stable counting sort in parallel.
 
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Items ordered by key, items of one key in the order in which they came.
 #[derive(Debug)]
@@ -14,27 +15,20 @@ pub(super) struct Sorted {
 /// Keys of a part, as a power of two: their counts fit the first level of cache.
 const PART: u32 = 12;
 
-/// An item on its way to its place.
-#[derive(Clone, Copy, Debug, Default)]
-struct Item {
-    key: u32,
-    number: u32,
-}
-
 /// Sorts the items 0, 1, ... `count` (at most 2^32 - 1) by their keys, all below `keys`, a power of two of at most 2^31.
 ///
 /// Items are dealt to parts of 2^12 keys first, slice by slice of the input; then each part is sorted on its own. How many slices there are
 /// depends on the number of threads, and the outcome does not: a part takes its items from the slices in their order.
 pub(super) fn sort(count: usize, keys: usize, key: impl Fn(usize) -> u32 + Sync) -> Sorted {
     let width = keys.min(1 << PART);
-    let dealt = deal(count, keys / width, width.trailing_zeros(), key);
+    let (items, sizes) = deal(count, keys / width, width.trailing_zeros(), key);
     let mut order = vec![0u32; count];
     let mut starts = vec![0u32; keys + 1];
     starts[keys] = count as u32;
     let mut parts = Vec::with_capacity(keys / width);
-    let (mut items, mut places) = (dealt.items.as_slice(), order.as_mut_slice());
+    let (mut items, mut places) = (items.as_slice(), order.as_mut_slice());
     let mut first = 0;
-    for (counts, size) in starts[..keys].chunks_exact_mut(width).zip(dealt.sizes) {
+    for (counts, size) in starts[..keys].chunks_exact_mut(width).zip(sizes) {
         let (own, places_of_part);
         (own, items) = items.split_at(size);
         (places_of_part, places) = places.split_at_mut(size);
@@ -45,14 +39,8 @@ pub(super) fn sort(count: usize, keys: usize, key: impl Fn(usize) -> u32 + Sync)
     Sorted { order, starts }
 }
 
-struct Dealt {
-    items: Vec<Item>,
-    /// Items of each part.
-    sizes: Vec<usize>,
-}
-
-/// Items by part.
-fn deal(count: usize, parts: usize, shift: u32, key: impl Fn(usize) -> u32 + Sync) -> Dealt {
+/// Items by part, as key and number in one, and how many each part has.
+fn deal(count: usize, parts: usize, shift: u32, key: impl Fn(usize) -> u32 + Sync) -> (Vec<AtomicU64>, Vec<usize>) {
     let slice = count.div_ceil(rayon::current_num_threads()).max(1 << 14);
     let mut keyed = vec![0u32; count];
     let mut counts: Vec<Vec<u32>> = keyed
@@ -67,47 +55,52 @@ fn deal(count: usize, parts: usize, shift: u32, key: impl Fn(usize) -> u32 + Syn
             counts
         })
         .collect();
-    let sizes: Vec<usize> = (0..parts).map(|part| counts.iter().map(|c| c[part] as usize).sum()).collect();
 
-    // Every slice gets its own room in every part.
-    let mut items = vec![Item::default(); count];
-    let mut rooms: Vec<Vec<&mut [Item]>> = counts.iter().map(|_| Vec::with_capacity(parts)).collect();
-    let mut rest = items.as_mut_slice();
+    // Every slice gets its own room in every part: counts become places.
+    let mut sizes = Vec::with_capacity(parts);
+    let mut next = 0;
     for part in 0..parts {
-        for (rooms, counts) in rooms.iter_mut().zip(&counts) {
-            let room;
-            (room, rest) = rest.split_at_mut(counts[part] as usize);
-            rooms.push(room);
+        let first = next;
+        for counts in &mut counts {
+            let room = next;
+            next += counts[part];
+            counts[part] = room;
         }
+        sizes.push((next - first) as usize);
     }
-    keyed.par_chunks(slice).zip(rooms).zip(&mut counts).enumerate().for_each(|(s, ((keyed, mut rooms), next))| {
-        next.fill(0);
+
+    // No two threads write to one place; atomics say so to the compiler and cost nothing.
+    let items: Vec<AtomicU64> = std::iter::repeat_with(AtomicU64::default).take(count).collect();
+    keyed.par_chunks(slice).zip(counts).enumerate().for_each(|(s, (keyed, mut next))| {
         for (i, &key) in keyed.iter().enumerate() {
-            let part = (key >> shift) as usize;
-            rooms[part][next[part] as usize] = Item { key, number: (s * slice + i) as u32 };
-            next[part] += 1;
+            let place = &mut next[(key >> shift) as usize];
+            items[*place as usize].store(u64::from(key) << 32 | (s * slice + i) as u64, Ordering::Relaxed);
+            *place += 1;
         }
     });
-    Dealt { items, sizes }
+    (items, sizes)
 }
 
 /// Sorts a part; `counts` are zero on entry, and where each key starts on return.
-fn place(items: &[Item], places: &mut [u32], counts: &mut [u32], first: u32) {
+fn place(items: &[AtomicU64], places: &mut [u32], counts: &mut [u32], first: u32) {
     let mask = counts.len() - 1;
+    let key = |item: u64| (item >> 32) as usize & mask;
     for item in items {
-        counts[item.key as usize & mask] += 1;
+        counts[key(item.load(Ordering::Relaxed))] += 1;
     }
-    let mut end = first;
+    let mut end = 0;
     for count in counts.iter_mut() {
         end += *count;
         *count = end;
     }
     // From the last item to the first, so that ends become starts and equal keys keep their order.
     for item in items.iter().rev() {
-        let start = &mut counts[item.key as usize & mask];
+        let item = item.load(Ordering::Relaxed);
+        let start = &mut counts[key(item)];
         *start -= 1;
-        places[(*start - first) as usize] = item.number;
+        places[*start as usize] = item as u32;
     }
+    counts.iter_mut().for_each(|start| *start += first);
 }
 
 #[cfg(test)]

@@ -138,7 +138,7 @@ fn each_technique_alone_is_the_path_tracer() {
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn each_technique_alone_is_the_path_tracer_closely() {
-    pure(768, 0.05, |_, _| true);
+    pure(256, 0.1, |_, _| true);
 }
 
 /// All techniques together, by every heuristic.

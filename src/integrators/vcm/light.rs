@@ -17,6 +17,7 @@ use crate::transport::subpath::{Start, SubpathVertex};
 use crate::transport::survival::Met;
 use crate::transport::walk::Tally;
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 
 /// A vertex of a light subpath whose surface has a lobe that is no delta: 116 bytes.
 #[derive(Clone, Copy, Debug)]
@@ -199,14 +200,13 @@ pub(super) struct Merging {
 impl Merging {
     /// Sorts all vertices that may merge into cells of side `cell`.
     pub(super) fn new(light: &LightSide, cell: f32) -> Self {
-        let mut places: Vec<[u32; 2]> = Vec::new();
-        let mut letters = Vec::new();
-        for (number, batch) in light.batches.iter().enumerate() {
-            for (i, _) in batch.vertices.iter().enumerate().filter(|(_, vertex)| vertex.carried.share > 0.0) {
-                places.push([number as u32, i as u32]);
-                letters.extend(batch.letters.get(i));
-            }
-        }
+        let of_batch = |(number, batch): (usize, &Batch)| -> Vec<[u32; 2]> {
+            let merge = batch.vertices.iter().enumerate().filter(|(_, vertex)| vertex.carried.share > 0.0);
+            merge.map(|(i, _)| [number as u32, i as u32]).collect()
+        };
+        let places: Vec<[u32; 2]> = light.batches.par_iter().enumerate().flat_map_iter(of_batch).collect();
+        let kept = |&[batch, place]: &[u32; 2]| light.batches[batch as usize].letters.get(place as usize).copied();
+        let letters = places.iter().map_while(kept).collect();
         let vertex = |i: usize| {
             let [batch, place] = places[i].map(|n| n as usize);
             &light.batches[batch].vertices[place]

@@ -272,6 +272,24 @@ const FOLDERS: [&str; 16] = [
     "tests/scenes/envmap-rotated",
 ];
 
+/// A floor and a ball of the one material that no scene file has.
+const PHONG: &str = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><transform name=\"to_world\"><lookat origin=\"0, -4, 2\" \
+     target=\"0, 0, 0.5\" up=\"0, 0, 1\"/></transform><film type=\"hdrfilm\"><integer name=\"width\" value=\"32\"/><integer name=\"height\" \
+     value=\"32\"/></film></sensor><bsdf type=\"phong\" id=\"gloss\"><float name=\"exponent\" value=\"12\"/><rgb name=\"diffuse_reflectance\" \
+     value=\"0.4\"/><rgb name=\"specular_reflectance\" value=\"0.4\"/></bsdf><shape type=\"rectangle\"><transform name=\"to_world\"><scale \
+     value=\"4\"/></transform><ref id=\"gloss\"/></shape><shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"0\" z=\"1\"/><ref id=\"gloss\"/>\
+     </shape><shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" y=\"0\" z=\"0\" angle=\"180\"/><translate x=\"1\" y=\"-1\" \
+     z=\"4\"/></transform><emitter type=\"area\"><rgb name=\"radiance\" value=\"5\"/></emitter></shape></scene>";
+
+fn scenes() -> Vec<(&'static str, Scene)> {
+    let read = |file: &Path| load(file, &LoadOptions::default()).unwrap().scene;
+    let stored = |folder| (folder, read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join("scene.xml")));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scene.xml");
+    std::fs::write(&file, PHONG).unwrap();
+    FOLDERS.into_iter().map(stored).chain([("phong", read(&file))]).collect()
+}
+
 fn heuristics() -> Vec<Heuristic> {
     let with = |merges, beta| Heuristic::new(merges, beta).unwrap();
     let mut list = vec![Heuristic::default(), with(MergeWeights::Power, 2.0)];
@@ -285,9 +303,7 @@ fn heuristics() -> Vec<Heuristic> {
 fn the_engine_weighs_paths_by_their_definition() {
     let mut report = Vec::new();
     let mut wrong = 0;
-    for folder in FOLDERS {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join("scene.xml");
-        let scene = load(&file, &LoadOptions::default()).unwrap().scene;
+    for (folder, scene) in scenes() {
         let size = scene.camera().resolution();
         let (mut count, mut kinds, mut worst) = (0, [0; 5], 0.0f64);
         for (number, heuristic) in heuristics().into_iter().enumerate() {
