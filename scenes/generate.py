@@ -282,6 +282,18 @@ def pool():
     boxes(path("pool/meshes/steps.obj"), (-2.2, -1.8, -1.2, -0.25, -1.6, -0.4), (-1.8, -1.45, -1.2, -0.55, -1.6, -0.4), (-1.45, -1.1, -1.2, -0.85, -1.6, -0.4))
 
 
+def tube(file, radius, length, facets):
+    """An open prism along +z from z = 0: quads that face outwards, no normals."""
+    with open(file, "w") as f:
+        for z in (0, length):
+            for i in range(facets):
+                a = 2 * math.pi * i / facets
+                f.write("v %.6f %.6f %.6f\n" % (radius * math.cos(a), radius * math.sin(a), z))
+        for i in range(facets):
+            j = (i + 1) % facets
+            f.write(f"f {i + 1} {j + 1} {j + facets + 1} {i + facets + 1}\n")
+
+
 if __name__ == "__main__":
     block(path("box/meshes/tall.obj"), -0.34, -0.3, 0.3, 1.2, 18)
     block(path("box/meshes/short.obj"), 0.36, 0.32, 0.3, 0.6, -17)
@@ -292,3 +304,4 @@ if __name__ == "__main__":
     villa()
     canyon()
     pool()
+    tube(path("spheres/meshes/tube.obj"), 0.11, 0.3, 12)

@@ -1,11 +1,12 @@
 //! Build and query of the photon grid beside a k-d tree (`kiddo`) and a plain hash grid: `run.sh` beside this folder's manifest.
 //!
 //! A million points, on the walls of a box or gathered in bright curves on its floor; queries at places of the same density, in random
-//! order and along a space-filling curve, as neighbouring pixels ask; radii that find 1, 10, 100 points on average. One thread, and for
-//! building all of them too. Rounds alternate between the structures; medians over rounds.
+//! order and along a space-filling curve, as neighbouring pixels ask; radii that find 1, 10, 100 points on average. One thread, processor
+//! time. Rounds alternate between the structures; medians over rounds.
 
 mod plain;
 
+use cpu_time::ProcessTime;
 use glam::Vec3;
 use isophote::photons::Grid;
 use isophote::samplers::{Key, Purpose, Stream};
@@ -13,7 +14,6 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use plain::Plain;
 use std::env;
 use std::hint::black_box;
-use std::time::Instant;
 
 const POINTS: usize = 1_000_000;
 const QUERIES: usize = 500_000;
@@ -66,7 +66,7 @@ impl Found {
 }
 
 fn timed<T>(what: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
+    let start = ProcessTime::now();
     let result = what();
     (start.elapsed().as_secs_f64(), result)
 }
@@ -112,10 +112,16 @@ impl Side {
                         sum += d2;
                         found.see(number);
                     }),
-                    _ => self.tree.query(&q.to_array()).within::<SquaredEuclidean<f32>>(radius * radius).unsorted().exclusive_boundaries().visit(|r| {
-                        sum += r.distance;
-                        found.see(r.item as u32);
-                    }),
+                    _ => self
+                        .tree
+                        .query(&q.to_array())
+                        .within::<SquaredEuclidean<f32>>(radius * radius)
+                        .unsorted()
+                        .exclusive_boundaries()
+                        .visit(|r| {
+                            sum += r.distance;
+                            found.see(r.item as u32);
+                        }),
                 }
             }
             black_box(sum);
@@ -181,13 +187,13 @@ fn compare(name: &str, points: &[Vec3], queries: &[Vec3], k: f64, rounds: usize)
 
 fn main() {
     let rounds = env::var("GRID_ROUNDS").ok().and_then(|n| n.parse().ok()).unwrap_or(7);
-    let threads = env::var("GRID_THREADS").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().unwrap_or_else(|error| panic!("{error}"));
-    println!("{POINTS} points, {QUERIES} queries, {threads} threads to build and one to query, medians of {rounds} rounds");
+    let sizes = env::var("GRID_FOUND").unwrap_or_else(|_| "1 10 100".into());
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().unwrap_or_else(|error| panic!("{error}"));
+    println!("{POINTS} points, {QUERIES} queries, one thread, medians of {rounds} rounds");
     let sets: [(&str, fn(&mut isophote::samplers::UniformStream) -> Vec3); 2] = [("walls", on_walls), ("caustics", in_caustics)];
     for (name, make) in sets {
         let (points, queries) = (draw(POINTS, 0, make), draw(QUERIES, 1, make));
-        for k in [1.0, 10.0, 100.0] {
+        for k in sizes.split_whitespace().filter_map(|k| k.parse().ok()) {
             compare(name, &points, &queries, k, rounds);
         }
     }
