@@ -3,8 +3,8 @@
 //! [STF (11), (12)]: a path's target is the largest value of the points it reaches; 0 where it reaches none, so that the supports of all rungs
 //! above the uniform one are the same. Here the points are represented by the cells they lie in (module `cells`).
 
-use super::cells::Cells;
-use super::points::{DepthRange, MeasurementPoint};
+use super::cells::{Cells, Site};
+use super::points::DepthRange;
 use super::regions::{Refinement, Regions};
 use clap::ValueEnum;
 use glam::Vec3;
@@ -78,9 +78,9 @@ pub enum Place {
 }
 
 impl Place {
-    fn of(self, at: &MeasurementPoint<'_>) -> Vec3 {
+    fn of(self, at: &Site) -> Vec3 {
         match self {
-            Place::Space => at.point.end.p,
+            Place::Space => at.p,
             Place::Image { width } => Vec3::new((at.pixel % width) as f32 + 0.5, (at.pixel / width) as f32 + 0.5, 0.0),
         }
     }
@@ -88,7 +88,7 @@ impl Place {
 
 impl Aimer {
     /// Aims at a pilot's measurement points, of the first iteration's radii. Nothing is known of densities yet.
-    pub fn new(regions: Option<Regions>, place: Place, refinement: Refinement, depths: DepthRange, pilot: &[MeasurementPoint<'_>]) -> Self {
+    pub fn new(regions: Option<Regions>, place: Place, refinement: Refinement, depths: DepthRange, pilot: &[Site]) -> Self {
         let mut aimer = Self {
             scale: None,
             regions,
@@ -133,7 +133,7 @@ impl Aimer {
     /// points so far are used. \[STF\] does so before every iteration, which has two biases: where chains have lingered the density is
     /// found too high and the target made low, while the chains still stand there and bring more than the new target grants; and places that
     /// only the new points see have no states to begin with. Chains that are burnt in again forget both; at doubling intervals it costs little.
-    pub fn aim(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> (Vec<Aim>, bool) {
+    pub fn aim(&mut self, points: &[Site], shrink: f64) -> (Vec<Aim>, bool) {
         let mut aims = self.aims(points, shrink);
         let due = self.iterations == 0 || self.iterations.is_power_of_two();
         if due || self.iterations < LOOKS {
@@ -151,7 +151,7 @@ impl Aimer {
         (aims, new)
     }
 
-    fn aims(&mut self, points: &[MeasurementPoint<'_>], shrink: f64) -> Vec<Aim> {
+    fn aims(&mut self, points: &[Site], shrink: f64) -> Vec<Aim> {
         let sizes: Vec<f64> = points.par_iter().map(|m| f64::from(m.kernel_size()) / (shrink * shrink)).collect();
         if sizes.is_empty() {
             return Vec::new();

@@ -10,7 +10,7 @@
 
 use super::aim::Aim;
 use super::light_paths::LightVertex;
-use super::points::{DepthRange, MeasurementPoint};
+use super::points::{DepthRange, MeasurementPoint, kernel_size};
 use crate::math::fetch;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -67,6 +67,32 @@ impl Gate {
     #[inline(always)]
     fn admits(self, face: u8, depth: u32, counted: DepthRange) -> bool {
         self.faces & face != 0 && depth + u32::from(self.depths.0) <= counted.max && depth + u32::from(self.depths.1) >= counted.min
+    }
+}
+
+/// What targets ask of a measurement point: a quarter of its memory, so that a pilot of many points is small.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Its place.
+    pub p: Vec3,
+    /// Radius of its density estimate, world units.
+    pub radius: f32,
+    /// [`MeasurementPoint::footprint`].
+    pub footprint: f32,
+    /// Row-major number of its pixel.
+    pub pixel: u32,
+    gate: Gate,
+}
+
+impl Site {
+    /// Of a measurement point.
+    pub fn of(m: &MeasurementPoint<'_>) -> Self {
+        Self { p: m.point.end.p, radius: m.radius, footprint: m.footprint, pixel: m.pixel, gate: Gate::of(m) }
+    }
+
+    /// Kernel size `s_k = pi r_k^2`, world units squared.
+    pub fn kernel_size(&self) -> f32 {
+        kernel_size(self.radius)
     }
 }
 
@@ -172,19 +198,19 @@ impl Cells {
 
     /// Adds measurement points with their kernel targets and regions. Cells are as wide as the larger of radius and footprint, to twice
     /// that: narrow, because what lies in a cell and is not seen takes paths away, and wide enough that few points a pixel find most cells.
-    pub fn add(&mut self, points: &[MeasurementPoint<'_>], aims: &[Aim]) {
-        let exponent = |m: &MeasurementPoint<'_>| m.radius.max(m.footprint).log2().ceil() as i32;
-        let Some(widest) = points.iter().map(exponent).max() else { return };
+    pub fn add(&mut self, sites: &[Site], aims: &[Aim]) {
+        let exponent = |m: &Site| m.radius.max(m.footprint).log2().ceil() as i32;
+        let Some(widest) = sites.iter().map(exponent).max() else { return };
         let top = *self.top.get_or_insert(widest);
-        for (m, aim) in points.iter().zip(aims) {
+        for (m, aim) in sites.iter().zip(aims) {
             let level = (top - exponent(m)).clamp(0, LEVELS - 1);
-            let p = m.point.end.p;
+            let p = m.p;
             let (cell, content) = self.known.entry(Key::of(p, inverse_side(top, level), level), Content::EMPTY);
             content.points += 1.0;
             content.kernel += f64::from(aim.kernel);
             (content.low, content.high) = (content.low.min(p), content.high.max(p));
             content.reach = content.reach.max(m.radius);
-            content.gate.join(Gate::of(m));
+            content.gate.join(m.gate);
             self.arrived.push(Part::place(cell, aim.leaf));
         }
         if self.arrived.len() > MOST_ARRIVED {

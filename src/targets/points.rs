@@ -33,8 +33,13 @@ pub struct MeasurementPoint<'a> {
 impl MeasurementPoint<'_> {
     /// Kernel size `s_k = pi r_k^2`, world units squared.
     pub fn kernel_size(&self) -> f32 {
-        PI * self.radius * self.radius
+        kernel_size(self.radius)
     }
+}
+
+/// Kernel size of a radius.
+pub(super) fn kernel_size(radius: f32) -> f32 {
+    PI * radius * radius
 }
 
 /// Path lengths that count, in edges from light to camera.

@@ -11,6 +11,7 @@ use crate::photons::radius::shrink;
 use crate::samplers::{Ladder, PhotonSampler};
 use crate::targets::aim::{Aimer, Place, Rung};
 use crate::targets::aimed::AimedPaths;
+use crate::targets::cells::Site;
 use crate::targets::deposits::{Deposits, collect, halves};
 use crate::targets::points::{MeasurementPoint, PointGrid, Points};
 use crate::targets::regions::Regions;
@@ -52,11 +53,11 @@ impl Aimed {
         (!radii.is_empty()).then(|| *radii.select_nth_unstable_by(middle, f32::total_cmp).1)
     }
 
-    fn aimer(&self, sppm: &Sppm<'_>, pilot: &[MeasurementPoint<'_>]) -> Aimer {
+    fn aimer(&self, sppm: &Sppm<'_>, pilot: &[Site]) -> Aimer {
         let regions = match self.regions {
             RegionKind::None => None,
             RegionKind::Image => Some(Regions::image(sppm.eye.size.0, sppm.eye.size.1)),
-            RegionKind::Space => Some(Regions::spatial(pilot.iter().map(|m| m.point.end.p).collect())),
+            RegionKind::Space => Some(Regions::spatial(pilot.iter().map(|m| m.p).collect())),
         };
         Aimer::new(regions, self.place(&sppm.eye), sppm.settings.refinement(), sppm.eye.depths(), pilot)
     }
@@ -83,9 +84,9 @@ impl Aimed {
         let (mut values, measured, glossy) = look(sppm, sppm.radius_at(i), i, stats);
 
         // Light paths.
-        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, &measured));
+        let mut aimer = self.aimer.take().unwrap_or_else(|| self.aimer(sppm, &sites(&measured)));
         let shrink = shrink(i, sppm.settings.alpha);
-        let (grid, (aims, new)) = rayon::join(|| PointGrid::build(&measured), || aimer.aim(&measured, shrink));
+        let (grid, (aims, new)) = rayon::join(|| PointGrid::build(&measured), || aimer.aim(&sites(&measured), shrink));
         if new {
             self.ladder.retargeted();
         }
@@ -162,13 +163,18 @@ fn look<'a>(sppm: &Sppm<'a>, radius: Radius, i: u64, stats: &mut IterationStats)
     (values, points, all)
 }
 
+fn sites(measured: &[MeasurementPoint<'_>]) -> Vec<Site> {
+    measured.par_iter().map(Site::of).collect()
+}
+
 /// Measurement points, some a pixel.
-fn pilot<'a>(eye: &Eye<'a>, radius: Radius, stats: &mut IterationStats) -> Vec<MeasurementPoint<'a>> {
+fn pilot(eye: &Eye<'_>, radius: Radius, stats: &mut IterationStats) -> Vec<Site> {
     let row = |y: usize| {
         let mut tally = Tally::default();
         let pixels = y * eye.size.0..(y + 1) * eye.size.0;
         let samples = pixels.flat_map(|pixel| (0..PILOT).map(move |number| (pixel, number)));
-        let found: Vec<_> = samples.filter_map(|(pixel, number)| eye.pilot(number, pixel, radius, &mut tally)).collect();
+        let found: Vec<_> =
+            samples.filter_map(|(pixel, number)| eye.pilot(number, pixel, radius, &mut tally).as_ref().map(Site::of)).collect();
         (found, tally)
     };
     let rows: Vec<_> = (0..eye.size.1).into_par_iter().with_max_len(1).map(row).collect();
@@ -233,7 +239,7 @@ mod tests {
             let sppm = sppm(&loaded.scene, max_depth);
             let (_, measured, _) = look(&sppm, sppm.radius_at(0), 0, &mut IterationStats::default());
             let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &[]);
-            assert!(aimer.trial() && aimer.aim(&measured, 1.0).1);
+            assert!(aimer.trial() && aimer.aim(&sites(&measured), 1.0).1);
             let points = indexed(&sppm, measured);
             let paths = paths(&sppm, &aimer, &points);
             let missed = paths.iter().filter(|(touches, reached)| *touches > 0 && *reached == 0).count();
@@ -255,7 +261,7 @@ mod tests {
         let pilot = pilot(&sppm.eye, sppm.radius_at(0), &mut stats);
         let mut aimer = Aimer::new(None, Place::Space, sppm.settings.refinement(), sppm.eye.depths(), &pilot);
         let (_, measured, _) = look(&sppm, sppm.radius_at(0), 0, &mut stats);
-        aimer.aim(&measured, 1.0);
+        aimer.aim(&sites(&measured), 1.0);
         let (_, measured, _) = look(&sppm, sppm.radius_at(1), 1, &mut stats);
         let points = indexed(&sppm, measured);
         let paths = paths(&sppm, &aimer, &points);
