@@ -155,10 +155,10 @@ mod tests {
         Key { seed: 3, iteration, index: 0, purpose: Purpose::Test }.stream()
     }
 
-    /// A pass's vertices, uniform on a square of side 2 at height 0.
+    /// A pass's vertices, uniform on a square of side 2 at height 0, where rounding throws them to either side.
     fn plane(iteration: u64) -> Vec<Vec3> {
         let mut s = stream(iteration);
-        (0..COUNT).map(|_| Vec3::new(2.0 * s.next_1d() - 1.0, 0.0, 2.0 * s.next_1d() - 1.0)).collect()
+        (0..COUNT).map(|i| Vec3::new(2.0 * s.next_1d() - 1.0, if i % 2 == 0 { 1e-8 } else { -1e-8 }, 2.0 * s.next_1d() - 1.0)).collect()
     }
 
     fn map(cell: f32, passes: u64) -> DensityMap {
