@@ -110,8 +110,9 @@ impl Integrator for Engine<'_> {
                 Some(radius) => radius,
                 None => {
                     let eye = Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() };
-                    // Where no pixel's centre shows a surface that merges, hardly any subpath will find one.
-                    let footprint = eye.median_footprint(&mut stats).unwrap_or(1e-3 * self.scene.bounding_sphere().1.max(1e-3));
+                    // Where no pixel's centre shows a surface that merges, hardly any subpath will find one; a scene without extent has none.
+                    let fallback = |extent: f32| if extent > 0.0 { 1e-3 * extent } else { 1.0 };
+                    let footprint = eye.median_footprint(&mut stats).unwrap_or_else(|| fallback(self.scene.bounding_sphere().1));
                     self.photons.radius_pixels.unwrap_or(1.0) * f64::from(footprint)
                 }
             };
