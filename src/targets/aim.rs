@@ -3,7 +3,7 @@
 //! [STF (11), (12)]: a path's target is the largest value of the points it reaches; 0 where it reaches none, so that the supports of all rungs
 //! above the uniform one are the same. Here the points are represented by the cells they lie in (module `cells`).
 
-use super::cells::{Cells, Site};
+use super::cells::{Cells, Seen, Site};
 use super::points::DepthRange;
 use super::regions::{Refinement, Regions};
 use clap::ValueEnum;
@@ -59,6 +59,8 @@ pub struct Aimer {
     inverse_densities: Vec<f64>,
     /// Regions read.
     region_count: usize,
+    /// Where the camera has measured.
+    seen: Seen,
     /// Where targets are positive, and what they are there.
     cells: Cells,
     /// Iterations aimed.
@@ -96,11 +98,12 @@ impl Aimer {
             refinement,
             inverse_densities: Vec::new(),
             region_count: 0,
+            seen: Seen::default(),
             cells: Cells::new(depths),
             iterations: 0,
         };
         let aims = aimer.aims(pilot, 1.0);
-        aimer.cells.add(pilot, &aims);
+        aimer.seen.add(pilot, &aims);
         aimer
     }
 
@@ -137,15 +140,15 @@ impl Aimer {
         let mut aims = self.aims(points, shrink);
         let due = self.iterations == 0 || self.iterations.is_power_of_two();
         if due || self.iterations < LOOKS {
-            self.cells.add(points, &aims);
+            self.seen.add(points, &aims);
         }
-        let new = self.iterations == 0 || (due && (self.regions.is_some() || self.cells.grown()));
+        let new = self.iterations == 0 || (due && (self.regions.is_some() || self.seen.grown()));
         if new {
             if self.read_densities(&aims) {
                 self.fill(&mut aims);
             }
             let inverse = &self.inverse_densities;
-            self.cells.set(|leaf| inverse.get(leaf as usize).copied().unwrap_or(1.0));
+            self.seen.set(&mut self.cells, |leaf| inverse.get(leaf as usize).copied().unwrap_or(1.0));
         }
         self.iterations += 1;
         (aims, new)

@@ -6,38 +6,22 @@
 //! reaches points outside all cells is not lost: rung 0 draws it, and its weight says that no other rung does.
 //!
 //! Cells are cubes with sides of powers of two, of a size for every size of points. A point
-//! lies in the cell of its centre; a cell makes those of its neighbours positive that its points' disks may reach into.
+//! lies in the cell of its centre; a cell makes those of its neighbours positive that its points' disks may reach into. `seen` gathers points and
+//! makes the targets; this module finds what a path's vertices are worth.
 
-use super::aim::Aim;
 use super::light_paths::LightVertex;
 use super::points::{DepthRange, MeasurementPoint, kernel_size};
 use crate::math::fetch;
 use glam::{IVec3, Vec3};
-use rayon::prelude::*;
 use table::{Key, Probe, Table};
 
+mod seen;
 mod table;
+
+pub use seen::Seen;
 
 /// Sizes of cells, each half as wide as the one before.
 const LEVELS: i32 = 32;
-
-/// Points whose places are kept one by one: 16 MiB.
-const MOST_ARRIVED: usize = 1 << 21;
-
-/// What has been seen in one cell.
-#[derive(Clone, Copy, Debug)]
-struct Content {
-    /// Measurement points with their centre here.
-    points: f64,
-    /// Sum of their kernel targets.
-    kernel: f64,
-    /// Box around their centres.
-    low: Vec3,
-    high: Vec3,
-    /// Largest of their radii.
-    reach: f32,
-    gate: Gate,
-}
 
 /// Which light vertices of a cell count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,28 +94,6 @@ fn face(n: Vec3) -> u8 {
     1 << (2 * axis + usize::from(n[axis] < 0.0))
 }
 
-/// Points of one region in one cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Part {
-    /// Number of the cell in the high half, of the region in the low one.
-    place: u64,
-    points: u32,
-}
-
-impl Part {
-    fn place(cell: u32, leaf: u32) -> u64 {
-        u64::from(cell) << 32 | u64::from(leaf)
-    }
-
-    fn cell(self) -> usize {
-        (self.place >> 32) as usize
-    }
-
-    fn leaf(self) -> u32 {
-        self.place as u32
-    }
-}
-
 /// What light vertices of a cell are worth.
 #[derive(Clone, Copy, Debug)]
 struct Worth {
@@ -140,23 +102,20 @@ struct Worth {
     gate: Gate,
 }
 
-/// Cells that hold measurement points, and targets at them.
+impl Worth {
+    const NOTHING: Self = Self { kernel: 0.0, full: 0.0, gate: Gate::SHUT };
+}
+
+/// Targets in the cells that hold measurement points, and in those that their disks reach into.
 #[derive(Clone, Debug)]
 pub struct Cells {
     depths: DepthRange,
-    /// Binary logarithm of the widest side; set by the first points.
-    top: Option<i32>,
-    known: Table<Content>,
-    /// By place.
-    parts: Vec<Part>,
-    /// Places of points that are not among the parts yet.
-    arrived: Vec<u64>,
-    /// Cells with points when targets were last made.
-    made_of: usize,
     /// Sides' reciprocals, widest first.
     inverse_sides: Vec<f32>,
-    /// Levels present in each bucket of the widest cells.
+    /// Levels present in each bucket of the widest cells; a power of two of them.
     present: Vec<u32>,
+    /// Cells that `present` tells of.
+    told: usize,
     worths: Table<Worth>,
 }
 
@@ -183,109 +142,24 @@ pub struct CellSearch {
 impl Cells {
     /// No cells. `depths` are the path lengths that count, in edges from light to camera.
     pub fn new(depths: DepthRange) -> Self {
-        Self {
-            depths,
-            top: None,
-            known: Table::default(),
-            parts: Vec::new(),
-            arrived: Vec::new(),
-            made_of: 0,
-            inverse_sides: Vec::new(),
-            present: vec![0],
-            worths: Table::default(),
-        }
+        Self { depths, inverse_sides: Vec::new(), present: vec![0], told: 0, worths: Table::default() }
     }
 
-    /// Adds measurement points with their kernel targets and regions. Cells are as wide as the larger of radius and footprint, to twice
-    /// that: narrow, because what lies in a cell and is not seen takes paths away, and wide enough that few points a pixel find most cells.
-    pub fn add(&mut self, sites: &[Site], aims: &[Aim]) {
-        let exponent = |m: &Site| m.radius.max(m.footprint).log2().ceil() as i32;
-        let Some(widest) = sites.iter().map(exponent).max() else { return };
-        let top = *self.top.get_or_insert(widest);
-        for (m, aim) in sites.iter().zip(aims) {
-            let level = (top - exponent(m)).clamp(0, LEVELS - 1);
-            let p = m.p;
-            let (cell, content) = self.known.entry(Key::of(p, inverse_side(top, level), level), Content::EMPTY);
-            content.points += 1.0;
-            content.kernel += f64::from(aim.kernel);
-            (content.low, content.high) = (content.low.min(p), content.high.max(p));
-            content.reach = content.reach.max(m.radius);
-            content.gate.join(m.gate);
-            self.arrived.push(Part::place(cell, aim.leaf));
+    /// Tells of the levels of cells that are new. `top` is the widest side's binary logarithm.
+    fn tell(&mut self, top: i32) {
+        let wanted = (2 * self.worths.len()).next_power_of_two();
+        if self.present.len() < wanted {
+            self.present = vec![0; wanted];
+            self.told = 0;
         }
-        if self.arrived.len() > MOST_ARRIVED {
-            self.sort_in();
-        }
-    }
-
-    /// Counts the points that have arrived among the parts.
-    fn sort_in(&mut self) {
-        self.arrived.par_sort_unstable();
-        self.parts.extend(self.arrived.drain(..).map(|place| Part { place, points: 1 }));
-        // Two sorted runs: a stable sort merges them.
-        self.parts.sort_by_key(|part| part.place);
-        self.parts.dedup_by(|next, kept| {
-            let same = next.place == kept.place;
-            kept.points += if same { next.points } else { 0 };
-            same
-        });
-    }
-
-    /// Whether the points seen since targets were last made lie in new cells, more than one in a hundred.
-    pub fn grown(&self) -> bool {
-        100 * self.known.len() > 101 * self.made_of
-    }
-
-    /// Makes the targets: a cell is worth the mean of its points' targets, and a cell without points that a neighbour's disks may reach the mean
-    /// over these neighbours. `inverse_density` is the factor of the full target in a region.
-    pub fn set(&mut self, inverse_density: impl Fn(u32) -> f64) {
-        let Some(top) = self.top else { return };
-        self.sort_in();
-        self.made_of = self.known.len();
-        let mut densities = vec![0.0; self.known.len()];
-        for part in &self.parts {
-            densities[part.cell()] += f64::from(part.points) * inverse_density(part.leaf());
-        }
-        let own = |cell: usize, content: &Content| {
-            let kernel = content.kernel / content.points;
-            (kernel, kernel * densities[cell] / content.points)
-        };
-        let mut sums: Table<Sum> = Table::with_capacity(2 * self.known.len());
-        for (cell, (key, content)) in self.known.iter().enumerate() {
-            let sum = sums.entry(key, Sum::NOTHING).1;
-            sum.gate.join(content.gate);
-            (sum.kernel, sum.full) = own(cell, content);
-            sum.count = f64::INFINITY;
-        }
-        for (cell, (key, content)) in self.known.iter().enumerate() {
-            let inverse = inverse_side(top, key.level);
-            // A radius is no wider than a cell, but for a point wider than all that came first.
-            let reach = content.reach.min(inverse.recip());
-            let [low, high] = [content.low - reach, content.high + reach].map(|p| Key::of(p, inverse, key.level).cell);
-            let (kernel, full) = own(cell, content);
-            for z in low.z..=high.z {
-                for y in low.y..=high.y {
-                    for x in low.x..=high.x {
-                        let sum = sums.entry(Key { cell: IVec3::new(x, y, z), level: key.level }, Sum::NOTHING).1;
-                        sum.gate.join(content.gate);
-                        if sum.count.is_finite() {
-                            (sum.kernel, sum.full, sum.count) = (sum.kernel + kernel, sum.full + full, sum.count + 1.0);
-                        }
-                    }
-                }
-            }
-        }
-        self.worths = Table::with_capacity(sums.len());
-        self.present = vec![0; (2 * sums.len()).next_power_of_two()];
-        let deepest = sums.iter().map(|(key, _)| key.level).max().unwrap_or(0);
-        self.inverse_sides = (0..=deepest).map(|level| inverse_side(top, level)).collect();
-        for (key, sum) in sums.iter() {
-            let count = if sum.count.is_finite() { sum.count } else { 1.0 };
-            let worth = Worth { kernel: (sum.kernel / count) as f32, full: (sum.full / count) as f32, gate: sum.gate };
-            self.worths.entry(key, worth);
+        for number in self.told..self.worths.len() {
+            let key = self.worths.key(number);
             let bucket = self.bucket(key.cell >> key.level);
             self.present[bucket as usize] |= 1 << key.level;
+            let next = self.inverse_sides.len() as i32;
+            self.inverse_sides.extend((next..=key.level).map(|level| inverse_side(top, level)));
         }
+        self.told = self.worths.len();
     }
 
     #[inline(always)]
@@ -334,23 +208,6 @@ impl Cells {
         }
         reached
     }
-}
-
-impl Content {
-    const EMPTY: Self = Self { points: 0.0, kernel: 0.0, low: Vec3::INFINITY, high: Vec3::NEG_INFINITY, reach: 0.0, gate: Gate::SHUT };
-}
-
-/// Targets of a cell while they are gathered; `count` is infinite for a cell with points of its own.
-#[derive(Clone, Copy, Debug)]
-struct Sum {
-    kernel: f64,
-    full: f64,
-    count: f64,
-    gate: Gate,
-}
-
-impl Sum {
-    const NOTHING: Self = Self { kernel: 0.0, full: 0.0, count: 0.0, gate: Gate::SHUT };
 }
 
 /// Cells of level 0 have sides of `2^top`, each level halves them.

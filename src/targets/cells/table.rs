@@ -66,6 +66,16 @@ impl<T> Table<T> {
         self.entries.iter().map(|(key, value)| (*key, value))
     }
 
+    /// The cell of a number.
+    pub(super) fn key(&self, number: usize) -> Key {
+        self.entries[number].0
+    }
+
+    /// As [`Table::iter`], to change the values.
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = (Key, &mut T)> {
+        self.entries.iter_mut().map(|(key, value)| (*key, value))
+    }
+
     /// The number and value of a cell, `new` if there is none yet.
     pub(super) fn entry(&mut self, key: Key, new: T) -> (u32, &mut T) {
         if 2 * (self.entries.len() + 1) > self.slots.len() {
