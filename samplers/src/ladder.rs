@@ -22,9 +22,9 @@ use crate::diagnostics::{LadderReport, TRACE_POINTS};
 use crate::sampler::{Draw, Drawn, LightPathSpace, PhotonSampler};
 use crate::state::Chain;
 use carry::{Carried, KEPT};
-use ensemble::{Outcome, Plan};
+use ensemble::{Ensemble, Outcome, Plan};
 use normalisation::Normalisation;
-use rayon::prelude::*;
+use rayon::ScopeFifo;
 use serde::{Deserialize, Serialize};
 use summary::Summary;
 use weights::Mixture;
@@ -242,13 +242,13 @@ impl PhotonSampler for Ladder {
         let shares = self.shares.clone();
         let plan = self.plan(iteration, count, &shares);
         let ensembles = self.chains.len() as u64;
-        let run = |(ensemble, chains): (usize, &mut Vec<Chain>)| {
+        let run = |(ensemble, chains)| {
             let e = ensemble as u64;
             let first = e * (count / ensembles) + e.min(count % ensembles);
             let steps = count / ensembles + u64::from(e < count % ensembles);
-            ensemble::run(space, &plan, e, (first, steps), chains, start(), &emit)
+            Ensemble::new(space, &plan, e, (first, steps), chains, start(), &emit)
         };
-        let outcomes: Vec<Outcome<A>> = self.chains.par_iter_mut().enumerate().with_max_len(1).map(run).collect();
+        let outcomes = side_by_side(self.chains.iter_mut().map(Vec::as_mut_slice).enumerate(), run);
         let mut batches = Vec::with_capacity(outcomes.len());
         let mut tallies = Vec::with_capacity(outcomes.len());
         for outcome in outcomes {
@@ -270,5 +270,44 @@ impl PhotonSampler for Ladder {
         self.retargeted = false;
         let scales = (0..rungs).map(|rung| drawn.scale(rung, self.normalisation.b(rung))).collect();
         Draw { batches, scales, traced: self.traced - traced_before }
+    }
+}
+
+/// Runs ensembles, each made by `make`, to their ends, a slice of each in turn: a thread with nothing left to do waits for a slice of
+/// another's at most, not for an ensemble.
+fn side_by_side<'a, T: Send + 'a, P, A, E>(
+    inputs: impl Iterator<Item = T>,
+    make: impl Fn(T) -> Ensemble<'a, P, A, E> + Sync,
+) -> Vec<Outcome<A>>
+where
+    P: LightPathSpace + 'a,
+    A: Send + 'a,
+    E: Fn(&mut A, &P::Path, &[Drawn]) + Sync + 'a,
+{
+    let mut inputs: Vec<(Option<T>, Option<Outcome<A>>)> = inputs.map(|input| (Some(input), None)).collect();
+    rayon::scope_fifo(|scope| {
+        for (input, outcome) in &mut inputs {
+            let (make, input) = (&make, input.take());
+            scope.spawn_fifo(move |scope| {
+                if let Some(input) = input {
+                    go_on(scope, make(input), outcome);
+                }
+            });
+        }
+    });
+    inputs.into_iter().filter_map(|(_, outcome)| outcome).collect()
+}
+
+/// A slice, and what remains as a task behind those that wait.
+fn go_on<'s, 'a: 's, P, A, E>(scope: &ScopeFifo<'s>, mut ensemble: Ensemble<'a, P, A, E>, outcome: &'s mut Option<Outcome<A>>)
+where
+    P: LightPathSpace + 'a,
+    A: Send + 'a,
+    E: Fn(&mut A, &P::Path, &[Drawn]) + Sync + 'a,
+{
+    if ensemble.advance() {
+        scope.spawn_fifo(move |scope| go_on(scope, ensemble, outcome));
+    } else {
+        *outcome = Some(ensemble.finish());
     }
 }

@@ -29,6 +29,9 @@ use crate::stream::{Key, Purpose, UniformStream};
 /// Sizes of small steps, each half of the one before.
 const OCTAVES: usize = 7;
 
+/// Steps of a slice.
+const SLICE: u64 = 512;
+
 /// What all ensembles of a draw share.
 pub(super) struct Plan<'a> {
     pub(super) seed: u64,
@@ -110,13 +113,27 @@ struct Place {
     index: u64,
 }
 
-struct Ensemble<'a, P: LightPathSpace, A, E> {
+/// A running ensemble, advanced slice by slice so that threads finish together.
+pub(super) struct Ensemble<'a, P: LightPathSpace, A, E> {
     space: &'a P,
     plan: &'a Plan<'a>,
+    schedule: Schedule<'a>,
+    /// Number of the first step, and how many there are.
+    steps: (u64, u64),
+    /// Steps done.
+    done: u64,
+    /// The block that the next step belongs to.
+    block: usize,
+    /// Where it ends.
+    block_end: u64,
+    /// Rounds of the burn-in that remain.
+    burn_in: u64,
+    chains: &'a mut [Chain],
     random: UniformStream,
     /// States of rungs 1 and up.
     states: Vec<State<P::Path>>,
-    steps: Vec<(StepSize, u64)>,
+    /// Step sizes and turns of the chains.
+    sizes: Vec<(StepSize, u64)>,
     proposal: State<P::Path>,
     tallies: Vec<Tally>,
     accumulator: A,
@@ -126,40 +143,18 @@ struct Ensemble<'a, P: LightPathSpace, A, E> {
     traced: u64,
 }
 
-/// Runs ensemble number `ensemble` for `steps` steps, whose numbers begin with `first`; `chains` are its stored chains.
-pub(super) fn run<P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])>(
-    space: &P,
-    plan: &Plan<'_>,
-    ensemble: u64,
-    (first, steps): (u64, u64),
-    chains: &mut [Chain],
-    accumulator: A,
-    emit: &E,
-) -> Outcome<A> {
-    let mut run = Ensemble::new(space, plan, ensemble, chains, accumulator, emit);
-    let rungs = plan.shares.len();
-    if rungs > 1 {
-        for _ in 0..plan.burn_in {
-            for rung in 0..rungs {
-                run.step(rung, None);
-            }
-        }
-    }
-    let mut schedule = Schedule::new(plan.shares);
-    let mut step = 0;
-    for block in 0..BLOCKS {
-        let end = (u128::from(steps) * (block as u128 + 1) / BLOCKS as u128) as u64;
-        while step < end {
-            run.step(schedule.next(), Some(Place { block, index: first + step }));
-            step += 1;
-        }
-    }
-    run.finish(chains)
-}
-
 impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P, A, E> {
-    /// Replays the stored states under the present targets.
-    fn new(space: &'a P, plan: &'a Plan<'a>, ensemble: u64, chains: &[Chain], accumulator: A, emit: &'a E) -> Self {
+    /// Ensemble number `ensemble` with its stored chains `chains`, replayed under the present targets, for `steps.1` steps, whose numbers
+    /// begin with `steps.0`.
+    pub(super) fn new(
+        space: &'a P,
+        plan: &'a Plan<'a>,
+        ensemble: u64,
+        steps: (u64, u64),
+        chains: &'a mut [Chain],
+        accumulator: A,
+        emit: &'a E,
+    ) -> Self {
         let rungs = plan.shares.len();
         let mut random = Key { seed: plan.seed, iteration: plan.iteration, index: ensemble, purpose: Purpose::Mutate }.stream();
         let mut tallies: Vec<Tally> = (0..rungs).map(|_| Tally { cells: vec![0; CELLS], ..Tally::default() }).collect();
@@ -176,15 +171,59 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
             }
             states.push(state);
         }
-        let steps = chains.iter().map(|chain| (chain.step.clone(), chain.turn)).collect();
-        Self { space, plan, random, states, steps, proposal: State::new(rungs), tallies, accumulator, emit, drawn: Vec::new(), traced }
+        let sizes = chains.iter().map(|chain| (chain.step.clone(), chain.turn)).collect();
+        Self {
+            space,
+            plan,
+            schedule: Schedule::new(plan.shares),
+            steps,
+            done: 0,
+            block: 0,
+            block_end: end_of_block(0, steps.1),
+            burn_in: if rungs > 1 { plan.burn_in } else { 0 },
+            chains,
+            random,
+            states,
+            sizes,
+            proposal: State::new(rungs),
+            tallies,
+            accumulator,
+            emit,
+            drawn: Vec::new(),
+            traced,
+        }
+    }
+
+    /// Goes on by a slice. Returns whether there is more to do.
+    pub(super) fn advance(&mut self) -> bool {
+        if self.burn_in > 0 {
+            let rounds = self.burn_in.min((SLICE / self.plan.shares.len() as u64).max(1));
+            for _ in 0..rounds {
+                for rung in 0..self.plan.shares.len() {
+                    self.step(rung, None);
+                }
+            }
+            self.burn_in -= rounds;
+            return true;
+        }
+        let (first, steps) = self.steps;
+        for _ in 0..SLICE.min(steps - self.done) {
+            while self.done >= self.block_end {
+                self.block += 1;
+                self.block_end = end_of_block(self.block, steps);
+            }
+            let rung = self.schedule.next();
+            self.step(rung, Some(Place { block: self.block, index: first + self.done }));
+            self.done += 1;
+        }
+        self.done < steps
     }
 
     /// Hands out what is left and stores the chains.
-    fn finish(mut self, chains: &mut [Chain]) -> Outcome<A> {
-        for (rung, chain) in (1..).zip(chains) {
+    pub(super) fn finish(mut self) -> Outcome<A> {
+        for (rung, chain) in (1..).zip(std::mem::take(&mut self.chains)) {
             let state = &mut self.states[rung - 1];
-            let (step, turn) = self.steps[rung - 1].clone();
+            let (step, turn) = self.sizes[rung - 1].clone();
             *chain = Chain { coordinates: std::mem::take(&mut state.coordinates), life: state.life, climbed: state.climbed, step, turn };
             std::mem::swap(state, &mut self.proposal);
             self.hand_out();
@@ -209,7 +248,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
         match how {
             Proposal::Independent => {}
             Proposal::Small => {
-                let exponent = self.steps[rung - 1].0.exponent(self.random.below(OCTAVES));
+                let exponent = self.sizes[rung - 1].0.exponent(self.random.below(OCTAVES));
                 mutate_all(&self.states[rung - 1].coordinates, exponent, &mut self.random, made);
             }
             Proposal::End => {
@@ -283,7 +322,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
             let lengths = if how == Proposal::End { length as f64 / self.proposal.coordinates.len() as f64 } else { 1.0 };
             let accepted = self.random.chance() * old < new * lengths;
             if how == Proposal::Small {
-                self.steps[rung - 1].0.learn(accepted, self.plan.acceptance);
+                self.sizes[rung - 1].0.learn(accepted, self.plan.acceptance);
             }
             if accepted {
                 self.take(rung, climbed);
@@ -350,7 +389,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
     /// Exchanges with the rung above on even steps of the chain, with the one below on odd ones; rung 0 has its own way.
     #[inline]
     fn exchange_by_turns(&mut self, rung: usize, counted: bool) {
-        let turn = &mut self.steps[rung - 1].1;
+        let turn = &mut self.sizes[rung - 1].1;
         *turn += 1;
         if !self.plan.exchanges {
             return;
@@ -399,6 +438,11 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
             }
         }
     }
+}
+
+/// The first step after a block, of `steps` in all.
+fn end_of_block(block: usize, steps: u64) -> u64 {
+    (u128::from(steps) * (block as u128 + 1) / BLOCKS as u128) as u64
 }
 
 /// Takes every n-th counted step of a rung as a sample for the allocation.
