@@ -13,7 +13,7 @@ use super::light_paths::LightVertex;
 use super::points::{DepthRange, MeasurementPoint, kernel_size};
 use crate::math::fetch;
 use glam::{IVec3, Vec3};
-use table::{Key, Probe, Table};
+use table::{Key, Probe, SHARDS, Sharded};
 
 mod seen;
 mod table;
@@ -114,9 +114,9 @@ pub struct Cells {
     inverse_sides: Vec<f32>,
     /// Levels present in each bucket of the widest cells; a power of two of them.
     present: Vec<u32>,
-    /// Cells that `present` tells of.
-    told: usize,
-    worths: Table<Worth>,
+    /// Cells of each table that `present` tells of.
+    told: [usize; SHARDS],
+    worths: Sharded<Worth>,
 }
 
 /// What the cells around a path's vertices are worth.
@@ -142,7 +142,7 @@ pub struct CellSearch {
 impl Cells {
     /// No cells. `depths` are the path lengths that count, in edges from light to camera.
     pub fn new(depths: DepthRange) -> Self {
-        Self { depths, inverse_sides: Vec::new(), present: vec![0], told: 0, worths: Table::default() }
+        Self { depths, inverse_sides: Vec::new(), present: vec![0], told: [0; SHARDS], worths: Sharded::default() }
     }
 
     /// Tells of the levels of cells that are new. `top` is the widest side's binary logarithm.
@@ -150,16 +150,18 @@ impl Cells {
         let wanted = (2 * self.worths.len()).next_power_of_two();
         if self.present.len() < wanted {
             self.present = vec![0; wanted];
-            self.told = 0;
+            self.told = [0; SHARDS];
         }
-        for number in self.told..self.worths.len() {
-            let key = self.worths.key(number);
-            let bucket = self.bucket(key.cell >> key.level);
-            self.present[bucket as usize] |= 1 << key.level;
-            let next = self.inverse_sides.len() as i32;
-            self.inverse_sides.extend((next..=key.level).map(|level| inverse_side(top, level)));
+        for shard in 0..SHARDS {
+            for number in self.told[shard]..self.worths.0[shard].len() {
+                let key = self.worths.0[shard].key(number);
+                let bucket = self.bucket(key.cell >> key.level);
+                self.present[bucket as usize] |= 1 << key.level;
+                let next = self.inverse_sides.len() as i32;
+                self.inverse_sides.extend((next..=key.level).map(|level| inverse_side(top, level)));
+            }
+            self.told[shard] = self.worths.0[shard].len();
         }
-        self.told = self.worths.len();
     }
 
     #[inline(always)]

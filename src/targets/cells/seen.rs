@@ -3,7 +3,7 @@
 //! Cells are never forgotten, so which cell's disks reach into which is found out once: a change of densities is a sum over known pairs.
 
 use super::super::aim::Aim;
-use super::table::{Key, Table};
+use super::table::{Key, SHARDS, Table, shard};
 use super::{Cells, Gate, LEVELS, Site, Worth, inverse_side};
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -102,20 +102,26 @@ impl Part {
     }
 }
 
-/// A cell whose disks reach into another that has no points of its own.
+/// A cell with points, by its table and its number there.
 #[derive(Clone, Copy, Debug)]
-struct Pair {
-    /// Number of the cell with points, among those seen.
-    from: u32,
-    /// Number of the other, among those with targets.
-    to: u32,
+struct Place {
+    shard: u32,
+    number: u32,
 }
 
-/// Cells that hold measurement points, and what they hold.
+/// A cell whose disks reach into another.
+#[derive(Clone, Copy, Debug)]
+struct Reaching {
+    into: Key,
+    from: Place,
+    gate: Gate,
+    /// The other has not known of it.
+    new: bool,
+}
+
+/// Cells of one table that hold measurement points, what they hold, and what is reached into.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// Binary logarithm of the widest side; set by the first points.
-    top: Option<i32>,
+struct Shard {
     known: Table<Content>,
     /// By place.
     parts: Vec<Part>,
@@ -125,7 +131,22 @@ pub struct Seen {
     own: Vec<u32>,
     /// By number among cells with targets: it is a known one.
     is_known: Vec<bool>,
-    pairs: Vec<Pair>,
+    /// Cells whose disks reach into one without points of its own, and its number among those with targets.
+    pairs: Vec<(Place, u32)>,
+}
+
+/// Cells that hold measurement points.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Binary logarithm of the widest side; set by the first points.
+    top: Option<i32>,
+    shards: Vec<Shard>,
+}
+
+impl Default for Seen {
+    fn default() -> Self {
+        Self { top: None, shards: vec![Shard::default(); SHARDS] }
+    }
 }
 
 impl Seen {
@@ -133,27 +154,71 @@ impl Seen {
     /// that: narrow, because what lies in a cell and is not seen takes paths away, and wide enough that few points a pixel find most cells.
     pub fn add(&mut self, sites: &[Site], aims: &[Aim]) {
         let exponent = |m: &Site| m.radius.max(m.footprint).log2().ceil() as i32;
-        let Some(widest) = sites.iter().map(exponent).max() else { return };
+        let Some(widest) = sites.par_iter().map(exponent).max() else { return };
         let top = *self.top.get_or_insert(widest);
-        for (m, aim) in sites.iter().zip(aims) {
+        let key = |m: &Site| {
             let level = (top - exponent(m)).clamp(0, LEVELS - 1);
-            let p = m.p;
-            let (cell, content) = self.known.entry(Key::of(p, inverse_side(top, level), level), Content::EMPTY);
-            content.points += 1.0;
-            content.kernel += f64::from(aim.kernel);
-            (content.low, content.high) = (content.low.min(p), content.high.max(p));
-            content.reach = content.reach.max(m.radius);
-            content.gate.join(m.gate);
-            self.arrived.push(Part::place(cell, aim.leaf));
-        }
-        if self.arrived.len() > MOST_ARRIVED {
+            let key = Key::of(m.p, inverse_side(top, level), level);
+            (key, shard(key.hash()) as u8)
+        };
+        let (keys, shards): (Vec<Key>, Vec<u8>) = sites.par_iter().map(key).unzip();
+        self.shards.par_iter_mut().enumerate().with_max_len(1).for_each(|(mine, shard)| {
+            for (i, _) in shards.iter().enumerate().filter(|(_, of)| usize::from(**of) == mine) {
+                shard.add(keys[i], &sites[i], &aims[i]);
+            }
+        });
+    }
+
+    /// Cells with points, and those among them with targets.
+    fn counts(&self) -> (usize, usize) {
+        self.shards.iter().fold((0, 0), |(known, made), shard| (known + shard.known.len(), made + shard.own.len()))
+    }
+
+    /// Whether the points seen since targets were last made lie in new cells, more than one in a hundred.
+    pub fn grown(&self) -> bool {
+        let (known, made) = self.counts();
+        100 * known > 101 * made
+    }
+
+    /// Makes the targets: a cell is worth the mean of its points' targets, and a cell without points that a neighbour's disks may reach the mean
+    /// over these neighbours. `inverse_density` is the factor of the full target in a region.
+    pub fn set(&mut self, cells: &mut Cells, inverse_density: impl Fn(u32) -> f64 + Sync) {
+        let Some(top) = self.top else { return };
+        let Self { shards, .. } = self;
+        let worths = &mut cells.worths.0;
+        // Cells with points before all others: these ask which they are.
+        shards.par_iter_mut().zip(&mut *worths).with_max_len(1).for_each(|(shard, worths)| {
+            shard.sort_in();
+            shard.own(worths);
+        });
+        let reaching: Vec<_> = shards.par_iter_mut().enumerate().with_max_len(1).map(|(i, shard)| shard.reach(i, top)).collect();
+        shards.par_iter_mut().zip(&mut *worths).enumerate().with_max_len(1).for_each(|(into, (shard, worths))| {
+            reaching.iter().flat_map(|of_shard| &of_shard[into]).for_each(|reaching| shard.link(reaching, worths));
+            shard.is_known.resize(worths.len(), false);
+        });
+        let of_known: Vec<Vec<[f64; 2]>> = shards.par_iter().with_max_len(1).map(|shard| shard.worths(&inverse_density)).collect();
+        shards.par_iter().zip(worths).enumerate().with_max_len(1).for_each(|(i, (shard, worths))| shard.set(&of_known, i, worths));
+        cells.tell(top);
+    }
+}
+
+impl Shard {
+    fn add(&mut self, key: Key, m: &Site, aim: &Aim) {
+        let (cell, content) = self.known.entry(key, Content::EMPTY);
+        content.points += 1.0;
+        content.kernel += f64::from(aim.kernel);
+        (content.low, content.high) = (content.low.min(m.p), content.high.max(m.p));
+        content.reach = content.reach.max(m.radius);
+        content.gate.join(m.gate);
+        self.arrived.push(Part::place(cell, aim.leaf));
+        if self.arrived.len() > MOST_ARRIVED / SHARDS {
             self.sort_in();
         }
     }
 
     /// Counts the points that have arrived among the parts.
     fn sort_in(&mut self) {
-        self.arrived.par_sort_unstable();
+        self.arrived.sort_unstable();
         self.parts.extend(self.arrived.drain(..).map(|place| Part { place, points: 1 }));
         // Two sorted runs: a stable sort merges them.
         self.parts.sort_by_key(|part| part.place);
@@ -164,41 +229,8 @@ impl Seen {
         });
     }
 
-    /// Whether the points seen since targets were last made lie in new cells, more than one in a hundred.
-    pub fn grown(&self) -> bool {
-        100 * self.known.len() > 101 * self.own.len()
-    }
-
-    /// Makes the targets: a cell is worth the mean of its points' targets, and a cell without points that a neighbour's disks may reach the mean
-    /// over these neighbours. `inverse_density` is the factor of the full target in a region.
-    pub fn set(&mut self, cells: &mut Cells, inverse_density: impl Fn(u32) -> f64) {
-        let Some(top) = self.top else { return };
-        self.sort_in();
-        self.link(top, &mut cells.worths);
-        cells.tell(top);
-        let mut worths: Vec<[f64; 2]> = vec![[0.0; 2]; self.known.len()];
-        for part in &self.parts {
-            worths[part.cell()][1] += f64::from(part.points) * inverse_density(part.leaf());
-        }
-        for (worth, (_, content)) in worths.iter_mut().zip(self.known.iter()) {
-            let kernel = content.kernel / content.points;
-            *worth = [kernel, kernel * worth[1] / content.points];
-        }
-        let mut sums = vec![[0.0; 3]; cells.worths.len()];
-        for Pair { from, to } in &self.pairs {
-            let ([kernel, full], sum) = (worths[*from as usize], &mut sums[*to as usize]);
-            *sum = [sum[0] + kernel, sum[1] + full, sum[2] + 1.0];
-        }
-        for (own, [kernel, full]) in self.own.iter().zip(worths) {
-            sums[*own as usize] = [kernel, full, 1.0];
-        }
-        for ((_, worth), [kernel, full, count]) in cells.worths.iter_mut().zip(sums) {
-            (worth.kernel, worth.full) = ((kernel / count) as f32, (full / count) as f32);
-        }
-    }
-
-    /// Gives targets' cells to what is new, and finds the pairs.
-    fn link(&mut self, top: i32, worths: &mut Table<Worth>) {
+    /// Gives new cells with points their targets' cells.
+    fn own(&mut self, worths: &mut Table<Worth>) {
         let first = self.own.len();
         for number in first..self.known.len() {
             let own = worths.entry(self.known.key(number), Worth::NOTHING).0;
@@ -208,25 +240,66 @@ impl Seen {
         }
         if first < self.own.len() {
             let is_known = &self.is_known;
-            self.pairs.retain(|pair| !is_known[pair.to as usize]);
+            self.pairs.retain(|(_, to)| !is_known[*to as usize]);
         }
-        for (from, (key, content)) in (0..).zip(self.known.iter_mut()) {
+    }
+
+    /// What this shard's cells reach into and have not told, or not of their present gates, by shard.
+    fn reach(&mut self, shard_number: usize, top: i32) -> [Vec<Reaching>; SHARDS] {
+        let mut reaching: [Vec<Reaching>; SHARDS] = Default::default();
+        for (number, (key, content)) in (0..).zip(self.known.iter_mut()) {
             let near = content.near(key, inverse_side(top, key.level));
             let (before, gate) = content.told;
             if (near, content.gate) == (before, gate) {
                 continue;
             }
+            let from = Place { shard: shard_number as u32, number };
             near.each(|offset| {
-                let (to, worth) = worths.entry(Key { cell: key.cell + offset, level: key.level }, Worth::NOTHING);
-                worth.gate.join(content.gate);
-                let known = self.is_known.get(to as usize).is_some_and(|known| *known);
-                if !known && !before.contains(offset) {
-                    self.pairs.push(Pair { from, to });
-                }
+                let into = Key { cell: key.cell + offset, level: key.level };
+                let new = !before.contains(offset);
+                reaching[shard(into.hash())].push(Reaching { into, from, gate: content.gate, new });
             });
             content.told = (near, content.gate);
         }
-        self.is_known.resize(worths.len(), false);
+        reaching
+    }
+
+    /// Takes note of a cell that reaches into one of this shard.
+    fn link(&mut self, reaching: &Reaching, worths: &mut Table<Worth>) {
+        let (to, worth) = worths.entry(reaching.into, Worth::NOTHING);
+        worth.gate.join(reaching.gate);
+        let known = self.is_known.get(to as usize).is_some_and(|known| *known);
+        if !known && reaching.new {
+            self.pairs.push((reaching.from, to));
+        }
+    }
+
+    /// Kernel and full targets of the cells with points.
+    fn worths(&self, inverse_density: impl Fn(u32) -> f64) -> Vec<[f64; 2]> {
+        let mut worths = vec![[0.0; 2]; self.known.len()];
+        for part in &self.parts {
+            worths[part.cell()][1] += f64::from(part.points) * inverse_density(part.leaf());
+        }
+        for (worth, (_, content)) in worths.iter_mut().zip(self.known.iter()) {
+            let kernel = content.kernel / content.points;
+            *worth = [kernel, kernel * worth[1] / content.points];
+        }
+        worths
+    }
+
+    /// Sets this shard's targets, of number `shard_number`, from those of all cells with points.
+    fn set(&self, of_known: &[Vec<[f64; 2]>], shard_number: usize, worths: &mut Table<Worth>) {
+        let mut sums = vec![[0.0; 3]; worths.len()];
+        for (from, to) in &self.pairs {
+            let ([kernel, full], sum) = (of_known[from.shard as usize][from.number as usize], &mut sums[*to as usize]);
+            *sum = [sum[0] + kernel, sum[1] + full, sum[2] + 1.0];
+        }
+        for (own, [kernel, full]) in self.own.iter().zip(&of_known[shard_number]) {
+            sums[*own as usize] = [*kernel, *full, 1.0];
+        }
+        for ((_, worth), [kernel, full, count]) in worths.iter_mut().zip(sums) {
+            (worth.kernel, worth.full) = ((kernel / count) as f32, (full / count) as f32);
+        }
     }
 }
 
@@ -259,21 +332,17 @@ mod tests {
 
     /// By definition, from all points at once and one cell after the other.
     fn worth(seen: &Seen, at: Key) -> [f64; 2] {
-        let mut of_known = vec![[0.0; 2]; seen.known.len()];
-        for part in &seen.parts {
-            of_known[part.cell()][1] += f64::from(part.points) * inverse_density(part.leaf());
-        }
         let (mut sum, mut count) = ([0.0; 2], 0.0);
-        for ((key, content), [_, densities]) in seen.known.iter().zip(of_known) {
-            let kernel = content.kernel / content.points;
-            let value = [kernel, kernel * densities / content.points];
-            if key == at {
-                return value;
-            }
-            let near = content.near(key, inverse_side(seen.top.unwrap(), key.level));
-            if key.level == at.level && (at.cell - key.cell).abs().max_element() <= 1 && near.contains(at.cell - key.cell) {
-                sum = [sum[0] + value[0], sum[1] + value[1]];
-                count += 1.0;
+        for shard in &seen.shards {
+            for ((key, content), value) in shard.known.iter().zip(shard.worths(inverse_density)) {
+                if key == at {
+                    return value;
+                }
+                let near = content.near(key, inverse_side(seen.top.unwrap(), key.level));
+                if key.level == at.level && (at.cell - key.cell).abs().max_element() <= 1 && near.contains(at.cell - key.cell) {
+                    sum = [sum[0] + value[0], sum[1] + value[1]];
+                    count += 1.0;
+                }
             }
         }
         sum.map(|sum| sum / count)
@@ -293,8 +362,8 @@ mod tests {
         at_once.set(&mut whole, inverse_density);
         by_and_by.set(&mut parts, inverse_density);
         assert_eq!(whole.worths.len(), parts.worths.len());
-        assert!(whole.worths.len() > at_once.known.len() + 1000 && at_once.known.len() > 1000);
-        for (number, (key, expected)) in whole.worths.iter().enumerate() {
+        assert!(whole.worths.len() > at_once.counts().0 + 1000 && at_once.counts().0 > 1000);
+        for (number, (key, expected)) in whole.worths.0.iter().flat_map(Table::iter).enumerate() {
             let (_, found) = parts.worths.at(&parts.worths.probe(key)).unwrap();
             assert_eq!(found.gate, expected.gate, "{key:?}");
             let close = |a: f32, b: f32| (a - b).abs() <= 1e-6 * b.abs();

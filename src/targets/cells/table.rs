@@ -43,7 +43,49 @@ const VACANT: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
     key: Key,
-    slot: u32,
+    hash: u32,
+}
+
+/// Tables side by side, each with the cells of a range of hashes, so that threads fill them at once.
+pub(super) const SHARDS: usize = 8;
+
+/// The table of a hash.
+#[inline(always)]
+pub(super) fn shard(hash: u32) -> usize {
+    (hash >> (u32::BITS - SHARDS.ilog2())) as usize
+}
+
+/// Tables of all shards.
+#[derive(Clone, Debug)]
+pub(super) struct Sharded<T>(pub(super) Vec<Table<T>>);
+
+impl<T> Default for Sharded<T> {
+    fn default() -> Self {
+        Self((0..SHARDS).map(|_| Table::default()).collect())
+    }
+}
+
+impl<T> Sharded<T> {
+    pub(super) fn len(&self) -> usize {
+        self.0.iter().map(Table::len).sum()
+    }
+
+    /// Asks for what [`Sharded::at`] reads.
+    #[inline(always)]
+    pub(super) fn probe(&self, key: Key) -> Probe {
+        let hash = key.hash();
+        let table = &self.0[shard(hash)];
+        fetch(&table.slots[hash as usize & (table.slots.len() - 1)]);
+        Probe { key, hash }
+    }
+
+    /// A number of its own and the value of a cell.
+    #[inline(always)]
+    pub(super) fn at(&self, probe: &Probe) -> Option<(u32, &T)> {
+        let shard = shard(probe.hash);
+        let (number, value) = self.0[shard].at(probe)?;
+        Some((number * SHARDS as u32 + shard as u32, value))
+    }
 }
 
 impl<T> Default for Table<T> {
@@ -91,18 +133,10 @@ impl<T> Table<T> {
         (number, &mut self.entries[number as usize].1)
     }
 
-    /// Asks for what [`Table::at`] reads.
-    #[inline(always)]
-    pub(super) fn probe(&self, key: Key) -> Probe {
-        let slot = key.hash() & (self.slots.len() as u32 - 1);
-        fetch(&self.slots[slot as usize]);
-        Probe { key, slot }
-    }
-
     /// Number and value of a cell.
     #[inline(always)]
-    pub(super) fn at(&self, probe: &Probe) -> Option<(u32, &T)> {
-        let number = self.slots[self.find(probe.key, probe.slot)];
+    fn at(&self, probe: &Probe) -> Option<(u32, &T)> {
+        let number = self.slots[self.find(probe.key, probe.hash)];
         self.entries.get(number as usize).map(|(_, value)| (number, value))
     }
 
@@ -137,6 +171,7 @@ mod tests {
     #[test]
     fn cells_are_found_again_and_no_others() {
         let mut table = Table::default();
+        let probe = |key: Key| Probe { key, hash: key.hash() };
         let key = |i: i32| Key { cell: IVec3::new(i % 10 - 5, i / 10 % 10 - 5, i / 100 - 5), level: i % 3 };
         for i in 0..1000 {
             *table.entry(key(i), 0).1 += i;
@@ -145,10 +180,24 @@ mod tests {
         assert_eq!(table.len(), 1000);
         assert!(table.iter().enumerate().all(|(i, (k, value))| k == key(i as i32) && *value == i as i32 + 1));
         for i in 0..1000 {
-            assert_eq!(table.at(&table.probe(key(i))), Some((i as u32, &(i + 1))));
+            assert_eq!(table.at(&probe(key(i))), Some((i as u32, &(i + 1))));
             let other = Key { level: 3, ..key(i) };
-            assert_eq!(table.at(&table.probe(other)), None);
+            assert_eq!(table.at(&probe(other)), None);
         }
+    }
+
+    /// Every cell is found in its shard, and numbers are its own.
+    #[test]
+    fn shards_share_no_number() {
+        let mut all = Sharded::default();
+        let key = |i: i32| Key { cell: IVec3::new(i % 10, i / 10 % 10, i / 100), level: 0 };
+        for i in 0..1000 {
+            all.0[shard(key(i).hash())].entry(key(i), i);
+        }
+        let numbers: std::collections::HashSet<u32> =
+            (0..1000).map(|i| all.at(&all.probe(key(i))).filter(|(_, v)| **v == i).unwrap().0).collect();
+        assert_eq!((numbers.len(), all.len()), (1000, 1000));
+        assert!(all.0.iter().all(|table| (80..180).contains(&table.len())));
     }
 
     /// Neighbouring cells fill the table evenly: at half load a look-up takes less than two steps.
