@@ -1,6 +1,8 @@
 //! The light's side: light subpaths, the vertices they leave, and their connections to the camera.
 
+use super::eye::in_class;
 use super::iteration::Iteration;
+use super::pyramid::RecordedSplat;
 use super::technique::Technique;
 use crate::image::film::Splat;
 use crate::math::{Frame, Rgb};
@@ -109,6 +111,8 @@ pub(super) struct Batch {
     /// Where each path's vertices end.
     ends: Vec<u32>,
     splats: Vec<Splat>,
+    /// The same by length, with weights and without; empty unless images of techniques are kept.
+    pub(super) recorded: Vec<RecordedSplat>,
     pub(super) tally: Tally,
 }
 
@@ -134,6 +138,7 @@ impl LightSide {
         for batch in &mut batches {
             // What is in the film is done with.
             batch.splats = Vec::new();
+            batch.recorded = Vec::new();
             firsts.push(paths);
             paths += batch.ends.len();
         }
@@ -232,7 +237,13 @@ impl Iteration<'_, '_> {
             for (i, vertex) in path.vertices.iter().enumerate() {
                 let lens = stream.as_mut().map_or(Vec2::ZERO, |stream| Vec2::from(stream.next_2d()));
                 let letters = path.letters.get(i).copied().unwrap_or_default();
-                batch.splats.extend(self.splat(vertex, letters, lens, &mut batch.tally));
+                if let Some((splat, unweighted)) = self.splat(vertex, letters, lens, &mut batch.tally) {
+                    batch.splats.push(splat);
+                    if self.records {
+                        let Splat { pixel, value: weighted } = splat;
+                        batch.recorded.push(RecordedSplat { pixel, edges: vertex.carried.edges + 1, weighted, unweighted });
+                    }
+                }
             }
         }
         if self.keeps_vertices() {
@@ -242,8 +253,8 @@ impl Iteration<'_, '_> {
         batch.ends.push(batch.vertices.len() as u32);
     }
 
-    /// A light vertex connected to the camera.
-    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, tally: &mut Tally) -> Option<Splat> {
+    /// A light vertex connected to the camera, and what it counts for with weight 1 where that is asked for.
+    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, tally: &mut Tally) -> Option<(Splat, Rgb)> {
         let edges = vertex.carried.edges + 1;
         if !self.depths.contains(edges) {
             return None;
@@ -253,18 +264,20 @@ impl Iteration<'_, '_> {
         let met = point.meet(Mode::Importance, connection.wo)?;
         let density = connection.pdf_pixel.0 / connection.distance2;
         let weight = self.weigh(Technique::Splat, self.splat_weight(vertex, &connection, &met));
-        if weight == 0.0 {
+        if weight == 0.0 && !self.records {
             return None;
         }
-        let mut value = vertex.flux * met.f * (point.cosine(Mode::Importance, connection.wo) * density * weight);
-        if let Some(pattern) = &self.common.paths {
-            value *= self.one_event(pattern, letters, (&point, Mode::Importance, connection.wo), Letters::default());
-        }
-        if value.is_black() || !self.camera_sees(vertex, &connection, tally) {
+        let way = (&point, Mode::Importance, connection.wo);
+        let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, letters, way, Letters::default()));
+        let cosine = point.cosine(Mode::Importance, connection.wo);
+        let with = |weight: f32| in_class(vertex.flux * met.f * (cosine * density * weight), class);
+        let value = with(weight);
+        let all = if self.records { with(1.0) } else { value };
+        if all.is_black() || !self.camera_sees(vertex, &connection, tally) {
             return None;
         }
         let (x, y) = (connection.film.x as usize, connection.film.y as usize);
-        Some(Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) })
+        Some((Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) }, all))
     }
 
     /// Weight of a light vertex connected to the camera.
