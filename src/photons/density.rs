@@ -302,9 +302,9 @@ mod tests {
     #[test]
     fn the_weights_fall_as_the_exponential() {
         let bits = |i: usize| Vec3::from_array([0, 1, 2].map(|axis| (i >> axis & 1) as f32));
-        for part in 0..8 {
+        for (part, weights) in DECAY.into_iter().enumerate() {
             let middle = 0.25 + 0.5 * bits(part);
-            for (corner, weight) in DECAY[part].into_iter().enumerate() {
+            for (corner, weight) in weights.into_iter().enumerate() {
                 let d = middle.distance(bits(corner));
                 assert!((weight * d.exp() - 1.0).abs() < 1e-6, "{part} {corner}");
             }

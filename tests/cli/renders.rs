@@ -115,7 +115,7 @@ fn time_windows_previews_and_progress() {
 /// Every technique of every length is a layer, and all are on one sheet beside the file.
 #[test]
 fn a_pyramid_is_layers_and_a_sheet() {
-    for (method, lit, dark) in [("bdpt", "weighted.2.vc1.R", "weighted.2.vm1.R"), ("vcm", "unweighted.3.vm2.R", "weighted.4.vc0.R")] {
+    for (method, lit, dark) in [("bdpt", "weighted.2.vc1.R", "weighted.2.vm1.R"), ("vcm", "unweighted.2.vm1.R", "weighted.4.vc0.R")] {
         let bench = Bench::new();
         let run = ["render", method, SCENE, "-o", "a.exr", "--max-depth", "3", "--iterations", "2", "--aov", "pyramid", "--json", "-q"];
         let statistics = bench.json(&run);

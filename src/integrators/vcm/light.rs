@@ -237,13 +237,7 @@ impl Iteration<'_, '_> {
             for (i, vertex) in path.vertices.iter().enumerate() {
                 let lens = stream.as_mut().map_or(Vec2::ZERO, |stream| Vec2::from(stream.next_2d()));
                 let letters = path.letters.get(i).copied().unwrap_or_default();
-                if let Some((splat, unweighted)) = self.splat(vertex, letters, lens, &mut batch.tally) {
-                    batch.splats.push(splat);
-                    if self.records {
-                        let Splat { pixel, value: weighted } = splat;
-                        batch.recorded.push(RecordedSplat { pixel, edges: vertex.carried.edges + 1, weighted, unweighted });
-                    }
-                }
+                self.splat(vertex, letters, lens, batch);
             }
         }
         if self.keeps_vertices() {
@@ -253,19 +247,19 @@ impl Iteration<'_, '_> {
         batch.ends.push(batch.vertices.len() as u32);
     }
 
-    /// A light vertex connected to the camera, and what it counts for with weight 1 where that is asked for.
-    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, tally: &mut Tally) -> Option<(Splat, Rgb)> {
+    /// Connects a light vertex to the camera.
+    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, batch: &mut Batch) {
         let edges = vertex.carried.edges + 1;
         if !self.depths.contains(edges) {
-            return None;
+            return;
         }
-        let connection = self.subpaths.scene.camera().connect(&vertex.end, lens)?;
+        let Some(connection) = self.subpaths.scene.camera().connect(&vertex.end, lens) else { return };
         let point = vertex.point(self.subpaths.scene);
-        let met = point.meet(Mode::Importance, connection.wo)?;
+        let Some(met) = point.meet(Mode::Importance, connection.wo) else { return };
         let density = connection.pdf_pixel.0 / connection.distance2;
         let weight = self.weigh(Technique::Splat, self.splat_weight(vertex, &connection, &met));
         if weight == 0.0 && !self.records {
-            return None;
+            return;
         }
         let way = (&point, Mode::Importance, connection.wo);
         let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, letters, way, Letters::default()));
@@ -273,11 +267,16 @@ impl Iteration<'_, '_> {
         let with = |weight: f32| in_class(vertex.flux * met.f * (cosine * density * weight), class);
         let value = with(weight);
         let all = if self.records { with(1.0) } else { value };
-        if all.is_black() || !self.camera_sees(vertex, &connection, tally) {
-            return None;
+        if all.is_black() || !self.camera_sees(vertex, &connection, &mut batch.tally) {
+            return;
         }
         let (x, y) = (connection.film.x as usize, connection.film.y as usize);
-        Some((Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) }, all))
+        let pixel = (y * self.size.0 + x) as u32;
+        let value = batch.tally.finite(value);
+        batch.splats.push(Splat { pixel, value });
+        if self.records {
+            batch.recorded.push(RecordedSplat { pixel, edges, weighted: value, unweighted: all });
+        }
     }
 
     /// Weight of a light vertex connected to the camera.
