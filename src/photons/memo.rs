@@ -43,7 +43,7 @@ impl Memo {
         Self { entries, shift: KEY - bits }
     }
 
-    /// The value of a cube of a [`folded`] cell, by [`kept`] what `value` says of it.
+    /// The value of a cube of a [`folded`] cell: what `value` says of it, as exactly as it is kept.
     #[inline(always)]
     pub(super) fn get(&self, cell: IVec3, cube: usize, value: impl FnOnce() -> f32) -> f32 {
         let [x, y, z] = cell.to_array().map(|c| c as u64);
