@@ -6,6 +6,7 @@ use super::options::{Size, max_depth, path_class, seconds};
 use super::output;
 use super::scene::{self, SceneArgs};
 use crate::image::film::Film;
+use crate::image::layers::LayerSums;
 use crate::integrators::{BoxedSettings, Method};
 use crate::render::{Bar, Changes, IterationRange, Lines, Progress, Silent};
 use crate::scene::mitsuba::LoadedScene;
@@ -66,11 +67,12 @@ impl CommonArgs {
         Ok(loaded)
     }
 
-    /// Refuses what takes more memory than allowed. `moments`: the film keeps squares as well.
-    pub(super) fn check_memory(&self, loaded: &LoadedScene, moments: bool) -> Result<(), Failure> {
+    /// Refuses what takes more memory than allowed. `moments`: the film keeps squares as well; `images`: so many further images.
+    pub(super) fn check_memory(&self, loaded: &LoadedScene, moments: bool, images: usize) -> Result<(), Failure> {
         let Some(Size(limit)) = self.max_memory else { return Ok(()) };
         let (width, height) = loaded.scene.camera().resolution();
-        let (scene, film) = (scene::bytes(loaded), Film::bytes(width, height, moments));
+        let (scene, film) =
+            (scene::bytes(loaded), Film::bytes(width, height, moments) + LayerSums::bytes(images, width as u64 * height as u64));
         if scene + film <= limit {
             return Ok(());
         }

@@ -23,6 +23,8 @@ enum Aov {
     Variance,
     /// Camera-side samples of the pixel
     Count,
+    /// What every technique brings to paths of every length, with its weight and without, and a contact sheet (bdpt, vcm)
+    Pyramid,
 }
 
 /// Options of rendering one image.
@@ -80,7 +82,6 @@ fn render_scene(arguments: &RenderArgs, method: &Method, settings: &dyn BoxedSet
     let reference = reference.transpose()?;
     let shared = &arguments.common;
     let loaded = shared.open(verbosity)?;
-    shared.check_memory(&loaded, output.layers.variance)?;
     let changes = shared.changes();
     let common = changes.common(arguments.seed, &loaded.defaults);
     let plan = Plan {
@@ -96,6 +97,8 @@ fn render_scene(arguments: &RenderArgs, method: &Method, settings: &dyn BoxedSet
     let record = SceneRecord { path: shared.scene.scene.display().to_string(), hash: loaded.content_hash.clone() };
     let metadata = Metadata::new(record, method.name, changes.settings_json(settings, &common, &loaded.film));
     let mut integrator = settings.build(&loaded.scene, plan.size, &common)?;
+    let images = if plan.output.layers.pyramid { integrator.technique_layers()?.len() } else { 0 };
+    shared.check_memory(&loaded, plan.output.layers.variance, images)?;
     let mut progress = progress(verbosity);
     rendering.store(true, Ordering::SeqCst);
     let outcome = render(integrator.as_mut(), &plan, metadata, progress.as_mut(), &interrupt)?;
@@ -113,8 +116,13 @@ fn output_of(arguments: &RenderArgs, method: &str) -> Result<Output, Failure> {
     if let Some((preview, _)) = &preview {
         check_writable(preview)?;
     }
-    let layers = Layers { variance: arguments.aov.contains(&Aov::Variance), count: arguments.aov.contains(&Aov::Count) };
-    Ok(Output { path, layers, preview })
+    let asked = |aov| arguments.aov.contains(&aov);
+    let layers = Layers { variance: asked(Aov::Variance), count: asked(Aov::Count), pyramid: asked(Aov::Pyramid) };
+    let output = Output { path, layers, preview };
+    if layers.pyramid {
+        check_writable(&output.sheet())?;
+    }
+    Ok(output)
 }
 
 /// `SCENEFOLDER.METHOD.exr` in the current directory.
@@ -149,6 +157,9 @@ fn report(arguments: &RenderArgs, plan: &Plan, outcome: &crate::render::Outcome,
             "non_finite_pixels": outcome.non_finite,
             "interrupted": outcome.interrupted.map(signals::name),
         });
+        if plan.output.layers.pyramid && iterations > 0 {
+            document["pyramid"] = plan.output.sheet().display().to_string().into();
+        }
         let metadata = serde_json::to_value(metadata).map_err(|error| Failure::new(error.to_string()))?;
         if let (Value::Object(document), Value::Object(metadata)) = (&mut document, metadata) {
             document.extend(metadata);

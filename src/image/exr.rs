@@ -8,6 +8,7 @@ use ::exr::prelude::{
     ReadChannels, ReadLayers, Text, Vec2, WritableImage, read,
 };
 use serde_json::Value;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Name of the header attribute that holds the metadata.
@@ -43,9 +44,9 @@ pub struct ExrFile {
 #[derive(Clone, Debug)]
 pub enum Plane {
     /// `NAME.R`, `NAME.G`, `NAME.B`.
-    Colour(&'static str, Vec<Rgb>),
+    Colour(Cow<'static, str>, Vec<Rgb>),
     /// `NAME.Y`.
-    Scalar(&'static str, Vec<f32>),
+    Scalar(Cow<'static, str>, Vec<f32>),
 }
 
 /// Reads a file.
@@ -231,7 +232,7 @@ mod tests {
         let picture = Picture::new(3, 2, pixels);
         let variance: Vec<Rgb> = (0..6).map(|i| Rgb::splat(i as f32 * 0.5)).collect();
         let metadata = json!({"scene": {"path": "Bücher/𝄞.xml"}, "schema": 1});
-        let planes = [Plane::Colour("variance", variance.clone()), Plane::Scalar("count", vec![4.0; 6])];
+        let planes = [Plane::Colour("variance".into(), variance.clone()), Plane::Scalar("count".into(), vec![4.0; 6])];
         write(&path, &picture, &planes, Some(&metadata)).expect("written");
         let file = read_file(&path).expect("read");
         let names: Vec<&str> = file.channels.iter().map(|c| c.name.as_str()).collect();

@@ -1,5 +1,6 @@
 //! The film keeps sums and counts, never means, so that films add.
 
+use super::layers::LayerSums;
 use crate::math::Rgb;
 use glam::Vec2;
 use std::ops::Range;
@@ -34,6 +35,11 @@ pub enum FilmError {
     /// One film keeps second moments, the other does not.
     #[error("one film has second moments and the other has not: render both with --aov variance, or neither")]
     Moments,
+    /// The films keep images of other techniques.
+    #[error(
+        "one film has images of techniques that the other has not: render both with --aov pyramid and the same techniques and depths, or neither"
+    )]
+    Layers,
     /// A list of sums is neither empty (where it may be) nor one entry a pixel.
     #[error("the film's {part} has {found} pixels where {expected} are needed")]
     Part {
@@ -85,6 +91,8 @@ pub struct Film {
     sums: RawFilm,
     /// What the running iteration has added, as an estimate of the image; empty unless squares are kept.
     running: Sums,
+    /// Further images, where they are asked for.
+    layers: Option<LayerSums>,
 }
 
 impl Film {
@@ -93,7 +101,7 @@ impl Film {
         let n = width * height;
         let blank = |wanted: bool| if wanted { vec![[0.0; 3]; n] } else { Vec::new() };
         let sums = RawFilm { width, height, eye: blank(true), squares: blank(moments), ..RawFilm::default() };
-        Self { sums, running: blank(moments) }
+        Self { sums, running: blank(moments), layers: None }
     }
 
     /// Most bytes a film of this size can hold.
@@ -231,6 +239,30 @@ impl Film {
         }
     }
 
+    /// Further images, if the film keeps any.
+    pub fn layers(&self) -> Option<&LayerSums> {
+        self.layers.as_ref()
+    }
+
+    /// From now on the film keeps these images.
+    pub fn keep_layers(&mut self, layers: LayerSums) {
+        self.layers = Some(layers);
+    }
+
+    /// The further images, for a method to add to: it gives them back by [`Film::keep_layers`].
+    pub fn take_layers(&mut self) -> Option<LayerSums> {
+        self.layers.take()
+    }
+
+    /// Means of the further images, in the order of their numbers: over camera-side samples or over light paths.
+    pub fn layer_means(&self) -> Vec<Vec<Rgb>> {
+        let mean = |layers: &LayerSums, i: usize| {
+            let count = if layers.layers()[i].splats { self.sums.splat_count } else { self.sums.eye_count };
+            layers.mean(i, count)
+        };
+        self.layers.iter().flat_map(|layers| (0..layers.layers().len()).map(move |i| mean(layers, i))).collect()
+    }
+
     /// Iterations finished.
     pub fn iterations(&self) -> u64 {
         self.sums.iterations
@@ -265,7 +297,7 @@ impl Film {
             }
         }
         let running = vec![[0.0; 3]; raw.squares.len()];
-        Ok(Self { sums: raw, running })
+        Ok(Self { sums: raw, running, layers: None })
     }
 
     /// Adds another film's sums and counts.
@@ -277,6 +309,13 @@ impl Film {
         }
         if left.squares.is_empty() != right.squares.is_empty() {
             return Err(FilmError::Moments);
+        }
+        let same = match (&mut self.layers, &other.layers) {
+            (Some(left), Some(right)) => left.merge(right),
+            (left, right) => left.is_none() && right.is_none(),
+        };
+        if !same {
+            return Err(FilmError::Layers);
         }
         add_all(&mut left.eye, &right.eye);
         add_all(&mut left.splats, &right.splats);

@@ -3,9 +3,11 @@
 pub mod exr;
 pub mod file;
 pub mod film;
+pub mod layers;
 pub mod metrics;
 pub mod picture;
 pub mod ramp;
 pub mod runs;
+pub mod sheet;
 pub mod tiles;
 pub mod tonemap;

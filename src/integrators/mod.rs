@@ -9,6 +9,7 @@ pub mod sppm;
 pub mod vcm;
 
 use crate::image::film::Film;
+use crate::image::layers::Layer;
 use crate::scene::Scene;
 use crate::transport::walk::Tally;
 use chains::ChainReport;
@@ -85,6 +86,10 @@ pub trait Integrator: Send {
     fn diagnostics(&self) -> Option<serde_json::Value> {
         None
     }
+    /// The images of single techniques that a film is to keep for `--aov pyramid`, by the numbers under which iterations add to them.
+    fn technique_layers(&self) -> Result<Vec<Layer>, MethodError> {
+        Err(MethodError::NoTechniques)
+    }
     /// What the sampler of light paths tells of its chains, if it has any.
     fn chains(&self) -> Option<ChainReport> {
         None
@@ -101,6 +106,15 @@ pub enum MethodError {
         method: &'static str,
         /// What is wrong and what to do.
         message: String,
+    },
+    /// The method has one way to make a path, or does not tell its ways apart.
+    #[error("--aov pyramid shows the techniques of bdpt and vcm; this method has none to show: leave it out")]
+    NoTechniques,
+    /// A pyramid without end.
+    #[error("--aov pyramid keeps an image of every technique of every path length: give --max-depth D, at most {most}")]
+    PyramidDepth {
+        /// The longest paths it can tell apart, edges.
+        most: u32,
     },
 }
 

@@ -7,6 +7,7 @@
 mod eye;
 mod iteration;
 mod light;
+mod pyramid;
 mod settings;
 mod technique;
 
@@ -14,6 +15,7 @@ use super::photon_settings::PhotonSettings;
 use super::sppm::eye::Eye;
 use super::{Common, Integrator, IterationStats, MethodError};
 use crate::image::film::Film;
+use crate::image::layers::Layer;
 use crate::photons::Grid;
 use crate::photons::density::{DensityMap, DensitySettings};
 use crate::photons::radius::shrink;
@@ -23,9 +25,9 @@ use crate::scene::hit::Endpoint;
 use crate::targets::points::DepthRange;
 use crate::transport::mis::{Heuristic, Sampling, Techniques, Weights};
 use crate::transport::subpath::{Photons, Subpaths};
-use crate::transport::walk::Tally;
 use iteration::Iteration;
 use light::{Batch, LightSide, Merging};
+use pyramid::Pyramid;
 
 pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
 pub use technique::{Technique, TechniqueName};
@@ -63,6 +65,11 @@ impl<'a> Engine<'a> {
         self.photons.roughness_threshold.unwrap_or(0.0)
     }
 
+    /// Path lengths that count.
+    fn depths(&self) -> DepthRange {
+        DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) }
+    }
+
     fn sampling(&self, i: u64) -> Sampling {
         let radius = self.radius * shrink(i, self.photons.alpha);
         let light_paths = self.photons.photon_count(self.size) as f64;
@@ -79,10 +86,11 @@ impl<'a> Engine<'a> {
             common: &self.common,
             index: i,
             size: self.size,
-            depths: DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) },
+            depths: self.depths(),
             radius: sampling.radius as f32,
             merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
             alone: self.alone,
+            records: false,
         }
     }
 
@@ -97,6 +105,7 @@ impl<'a> Engine<'a> {
         draw.batches.iter().for_each(|batch| stats.count(&batch.tally));
         if self.techniques.light_tracing {
             film.add_splats(&draw.batches, count);
+            iteration.record_splats(film, draw.batches.iter().flat_map(|batch| &batch.recorded), stats);
         }
         LightSide::new(draw)
     }
@@ -131,11 +140,10 @@ impl Integrator for Engine<'_> {
         let area = sampling.merge_area() as f32;
         let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
         let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
-        let iteration = self.iteration(i, &sampling, &weights, photons);
+        let iteration = Iteration { records: film.layers().is_some(), ..self.iteration(i, &sampling, &weights, photons) };
         let light = self.shoot(&iteration, film, &mut stats);
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
-        let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
-        film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
+        iteration.camera_side(film, &light, merging.as_ref(), &mut stats);
         // Only now, when every weight of the iteration is known.
         if let (Some(map), Some(merging)) = (&mut density, &merging) {
             let grid = merging.store.grid();
@@ -151,6 +159,11 @@ impl Integrator for Engine<'_> {
 
     fn radius(&self) -> Option<f64> {
         self.techniques.merges.then_some(self.radius)
+    }
+
+    fn technique_layers(&self) -> Result<Vec<Layer>, MethodError> {
+        let pyramid = Pyramid::new(self.techniques, self.depths()).ok_or(MethodError::PyramidDepth { most: pyramid::LONGEST })?;
+        Ok(pyramid.layers())
     }
 }
 

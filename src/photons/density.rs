@@ -3,9 +3,11 @@
 //! A pass reads what earlier passes counted and no more, so its weights are given before its samples are drawn: whatever the counts are, they
 //! cost noise and never bias.
 
-use super::cells::{Cells, floor};
-use glam::Vec3;
+use super::cells::{Cells, REGION_BUCKETS, floor};
+use super::memo::{Memo, folded};
+use glam::{IVec3, Vec3};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 use wide::{f32x8, i32x8};
 
@@ -14,7 +16,8 @@ use wide::{f32x8, i32x8};
 pub struct DensitySettings {
     /// Side `r_c` of a cell, world units, positive.
     pub cell: f32,
-    /// Counters, at least; a power of two of them is kept, at 4 bytes. Cells that share one are not told apart.
+    /// Counters, at least; a power of two of them can be told apart, at 8 bytes, in regions of 512 that exist where something is counted.
+    /// Cells that share one are not told apart.
     pub counters: usize,
     /// Passes that are counted; then the map stays as it is [VCM* 5.1].
     pub passes: u32,
@@ -31,11 +34,31 @@ impl DensitySettings {
 #[derive(Debug)]
 pub struct DensityMap {
     cells: Cells,
-    counters: Vec<AtomicU32>,
+    /// Counters, where any is needed.
+    regions: Vec<OnceLock<Box<Region>>>,
     settings: DensitySettings,
     passes: u32,
     /// Vertices counted in all, so that no counter overflows.
     total: u64,
+    /// What is read.
+    snapshot: Snapshot,
+}
+
+/// Counters of a region's cells.
+#[derive(Debug)]
+struct Region {
+    /// Until the last snapshot.
+    earlier: [u32; REGION_BUCKETS],
+    /// After it.
+    since: [AtomicU32; REGION_BUCKETS],
+}
+
+/// The counts as they stood after some pass.
+#[derive(Debug)]
+struct Snapshot {
+    passes: u32,
+    /// Filtered counts that were asked for.
+    filtered: Memo,
 }
 
 /// The lattice's offset in cells, so that floors at height 0 and other round numbers, where rounding throws a vertex to either side, lie inside
@@ -49,8 +72,8 @@ impl DensityMap {
     /// A map that has seen no pass.
     pub fn new(settings: DensitySettings) -> Self {
         let cells = Cells::new(settings.cell, settings.counters);
-        let counters = std::iter::repeat_with(AtomicU32::default).take(cells.buckets()).collect();
-        Self { cells, counters, settings, passes: 0, total: 0 }
+        let regions = std::iter::repeat_with(OnceLock::default).take(cells.buckets() / REGION_BUCKETS).collect();
+        Self { cells, regions, settings, passes: 0, total: 0, snapshot: Snapshot { passes: 0, filtered: Memo::new(0) } }
     }
 
     /// Passes counted.
@@ -71,12 +94,12 @@ impl DensityMap {
         }
         (0..count.div_ceil(TASK)).into_par_iter().for_each(|task| {
             let places = task * TASK..((task + 1) * TASK).min(count);
-            let (mut last, mut run) = (None, 0);
+            let (mut last, mut run) = (IVec3::ZERO, 0);
             for place in places {
-                let bucket = self.cells.bucket(floor(self.cells.scaled(position(place)) + OFFSET));
-                if last != Some(bucket) {
+                let cell = floor(self.cells.scaled(position(place)) + OFFSET);
+                if cell != last {
                     self.add(last, run);
-                    (last, run) = (Some(bucket), 0);
+                    (last, run) = (cell, 0);
                 }
                 run += 1;
             }
@@ -84,14 +107,25 @@ impl DensityMap {
         });
         self.passes += 1;
         self.total += count as u64;
+        if shows(self.passes) || self.is_frozen() {
+            self.take_snapshot();
+        }
     }
 
     /// A sum of whole numbers is the same in any order.
     #[inline(always)]
-    fn add(&self, bucket: Option<u32>, count: u32) {
-        if let Some(bucket) = bucket {
-            self.counters[bucket as usize].fetch_add(count, Ordering::Relaxed);
+    fn add(&self, cell: IVec3, count: u32) {
+        if count > 0 {
+            let bucket = self.cells.bucket(folded(cell)) as usize;
+            let region = self.regions[bucket / REGION_BUCKETS].get_or_init(Region::empty);
+            region.since[bucket % REGION_BUCKETS].fetch_add(count, Ordering::Relaxed);
         }
+    }
+
+    /// From now on all that is counted so far is read.
+    fn take_snapshot(&mut self) {
+        let used: usize = self.regions.par_iter_mut().filter_map(OnceLock::get_mut).map(|region| region.count_all()).sum();
+        self.snapshot = Snapshot { passes: self.passes, filtered: Memo::new(used) };
     }
 
     /// Expected number `k` of light vertices that a merge over the area `area` (the disk's, `pi r^2` with the radius of the pass that asks)
@@ -99,48 +133,74 @@ impl DensityMap {
     /// `exp(-d / r_c)` with the distance to the cell's centre, and 1 where none has any: a place that no vertex reached in n passes is taken to
     /// be reached by one in n [VCM* 5.1]. Positive. Before the first pass it is 1 everywhere, which leaves every heuristic as it is without
     /// densities.
+    ///
+    /// Distances are those of the middle of the half cell around `p`, and passes those until the last of 1, 2, 3, 4, 6, 8, 12, .. or of all
+    /// that are counted: so most answers are remembered.
     #[inline]
     pub fn photons(&self, p: Vec3, area: f32) -> f32 {
-        if self.passes == 0 {
+        let Snapshot { passes, filtered } = &self.snapshot;
+        if *passes == 0 {
             return 1.0;
         }
-        let count = self.count_around(p).max(1.0);
-        count * area / (self.settings.cell * self.settings.cell * self.passes as f32)
+        // In half cells, from the centre of a cell: the eight nearest centres are the corners of the unit cube of cells that holds the point.
+        let half = floor((self.cells.scaled(p) + (OFFSET - 0.5)) * 2.0);
+        let (corner, inside) = (folded(half >> 1), half & 1);
+        let part = (inside.x | inside.y << 1 | inside.z << 2) as usize;
+        let count = filtered.get(corner, part, || self.count_around(corner, part));
+        count * (area / (self.settings.cell * self.settings.cell * *passes as f32))
     }
 
-    /// Filtered count around a place; 0 where all eight cells are empty.
-    #[inline(always)]
-    fn count_around(&self, p: Vec3) -> f32 {
-        // In units of cells, from the centre of one: the eight nearest centres are the corners of the unit cube that holds the point.
-        let from = self.cells.scaled(p) + (OFFSET - 0.5);
-        let corner = floor(from);
-        let buckets = self.cells.buckets_of_eight(corner);
-        let counts = i32x8::new(buckets.map(|bucket| self.counters[bucket as usize].load(Ordering::Relaxed) as i32));
+    /// Filtered count in an eighth of the cube whose corners are the centres of eight cells, rounding kept from going below 1; 1 where all eight are empty.
+    #[cold]
+    #[inline(never)]
+    fn count_around(&self, corner: IVec3, part: usize) -> f32 {
+        let counts = i32x8::new(self.cells.buckets_of_eight(corner).map(|bucket| self.count(bucket as usize) as i32));
         let counts = f32x8::from_i32x8(counts);
-        let square = |d: f32, next: [f32; 8]| {
-            let d = f32x8::splat(d) - f32x8::new(next);
-            d * d
-        };
-        let from = from - corner.as_vec3();
-        let distance = (square(from.x, NEXT_X) + square(from.y, NEXT_Y) + square(from.z, NEXT_Z)).sqrt();
-        let weights = decay(distance) & counts.simd_gt(f32x8::ZERO);
+        let weights = f32x8::new(DECAY[part]) & counts.simd_gt(f32x8::ZERO);
         let weight = weights.reduce_add();
-        if weight > 0.0 { (weights * counts).reduce_add() / weight } else { 0.0 }
+        if weight > 0.0 { ((weights * counts).reduce_add() / weight).max(1.0) } else { 1.0 }
+    }
+
+    /// What a counter said when the snapshot was taken.
+    #[inline(always)]
+    fn count(&self, bucket: usize) -> u32 {
+        self.regions[bucket / REGION_BUCKETS].get().map_or(0, |region| region.earlier[bucket % REGION_BUCKETS])
     }
 }
 
-/// Corners of the unit cube in the order of [`Cells::buckets_of_eight`].
-const NEXT_X: [f32; 8] = [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0];
-const NEXT_Y: [f32; 8] = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0];
-const NEXT_Z: [f32; 8] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
+impl Region {
+    fn empty() -> Box<Self> {
+        Box::new(Self { earlier: [0; REGION_BUCKETS], since: std::array::from_fn(|_| AtomicU32::new(0)) })
+    }
 
-/// `exp(-d)` for d in [0, sqrt(3)], to 0.03 %: weights need no more, and the library's exponential took a third of a look-up.
-#[inline(always)]
-fn decay(d: f32x8) -> f32x8 {
-    // Least greatest relative error, by iteratively reweighted least squares.
-    let [a, b, c, e, f] = [0.999_752_75, -0.994_507_2, 0.477_740_36, -0.132_086_06, 0.016_985_25].map(f32x8::splat);
-    f.mul_add(d, e).mul_add(d, c).mul_add(d, b).mul_add(d, a)
+    /// What was counted since the last snapshot becomes part of it; counters that are not 0.
+    fn count_all(&mut self) -> usize {
+        for (earlier, since) in self.earlier.iter_mut().zip(&mut self.since) {
+            *earlier += std::mem::take(since.get_mut());
+        }
+        self.earlier.iter().filter(|&&count| count > 0).count()
+    }
 }
+
+/// Is a snapshot taken after so many passes: 1, 2, 3, 4, 6, 8, 12, 16, ..?
+fn shows(passes: u32) -> bool {
+    passes.is_power_of_two() || passes.is_multiple_of(3) && (passes / 3).is_power_of_two()
+}
+
+/// `exp(-d)`, `d` the distances in cells from the middle of an eighth of the unit cube to the cube's corners. Bits 0, 1, 2 of the eighth's number:
+/// the farther half along x, y, z; corners in the order of [`Cells::buckets_of_eight`], which is the same.
+const DECAY: [[f32; 8]; 8] = {
+    // By the number of axes along which the corner is on the far side: d^2 is 3, 11, 19, 27 sixteenths.
+    let near_to_far: [f32; 4] = [0.648_552_24, 0.436_417_4, 0.336_309_05, 0.272_794_07];
+    let mut weights = [[0.0; 8]; 8];
+    let mut pair = 0;
+    while pair < 64 {
+        let (part, corner) = (pair / 8, pair % 8);
+        weights[part][corner] = near_to_far[(part ^ corner).count_ones() as usize];
+        pair += 1;
+    }
+    weights
+};
 
 #[cfg(test)]
 mod tests {
@@ -241,9 +301,39 @@ mod tests {
 
     #[test]
     fn the_weights_fall_as_the_exponential() {
-        for i in 0..=1000 {
-            let d = 3.0f32.sqrt() * i as f32 / 1000.0;
-            assert!((decay(f32x8::splat(d)).to_array()[0] * d.exp() - 1.0).abs() < 3e-4, "{d}");
+        let bits = |i: usize| Vec3::from_array([0, 1, 2].map(|axis| (i >> axis & 1) as f32));
+        for (part, weights) in DECAY.into_iter().enumerate() {
+            let middle = 0.25 + 0.5 * bits(part);
+            for (corner, weight) in weights.into_iter().enumerate() {
+                let d = middle.distance(bits(corner));
+                assert!((weight * d.exp() - 1.0).abs() < 1e-6, "{part} {corner}");
+            }
+        }
+    }
+
+    /// Memory follows what is counted, not the number of counters.
+    #[test]
+    fn a_small_scene_has_few_regions() {
+        let map = map(0.05, 2);
+        let regions = map.regions.iter().filter(|region| region.get().is_some()).count();
+        // 40 x 40 cells in one layer, which may touch 6 x 6 regions.
+        assert!((25..=36).contains(&regions), "{regions}");
+    }
+
+    #[test]
+    fn what_is_read_is_never_the_running_pass_and_at_most_a_third_older() {
+        let shown: Vec<u32> = (1..=50).filter(|&n| shows(n)).collect();
+        assert_eq!(shown, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48]);
+        let points = plane(0);
+        let mut map = DensityMap::new(DensitySettings { cell: 0.02, counters: 1 << 20, passes: 50 });
+        for pass in 1..=10 {
+            map.insert(points.len(), |i| points[i]);
+            let k = map.photons(Vec3::new(0.1, 0.0, 0.1), 1e-3);
+            // The same points again and again: the mean over passes stays, whichever are read.
+            let mut first = DensityMap::new(map.settings);
+            first.insert(points.len(), |i| points[i]);
+            assert!((k / first.photons(Vec3::new(0.1, 0.0, 0.1), 1e-3) - 1.0).abs() < 1e-3, "{pass}: {k}");
+            assert!(map.snapshot.passes <= pass && 3 * map.snapshot.passes >= 2 * pass, "{pass}: {}", map.snapshot.passes);
         }
     }
 
@@ -259,7 +349,7 @@ mod tests {
             maps.push(map);
             points.reverse();
         }
-        let counts = |map: &DensityMap| map.counters.iter().map(|c| c.load(Ordering::Relaxed)).collect::<Vec<_>>();
+        let counts = |map: &DensityMap| (0..map.cells.buckets()).map(|bucket| map.count(bucket)).collect::<Vec<_>>();
         assert_eq!(counts(&maps[0]), counts(&maps[1]));
         assert_eq!(counts(&maps[0]), counts(&maps[2]));
         assert_eq!(counts(&maps[0]).iter().sum::<u32>(), COUNT as u32);

@@ -3,6 +3,7 @@
 mod cells;
 pub mod density;
 pub mod grid;
+mod memo;
 pub mod radius;
 mod sort;
 pub mod store;

@@ -7,8 +7,10 @@ use super::progress::{Progress, Step};
 use super::snapshots::{Snapshot, Snapshots};
 use crate::image::exr::{self, Plane};
 use crate::image::film::Film;
+use crate::image::layers::{Layer, LayerSums};
 use crate::image::metrics::{EPSILON, Pairs, SizeMismatch};
 use crate::image::picture::{ImageError, Picture};
+use crate::image::sheet::contact_sheet;
 use crate::image::tonemap::{Exposure, write_png};
 use crate::integrators::{Integrator, IterationStats, MethodError};
 use crate::math::Rgb;
@@ -61,6 +63,8 @@ pub struct Layers {
     pub variance: bool,
     /// `count.Y`: camera-side samples of the pixel.
     pub count: bool,
+    /// The images of single techniques, and a contact sheet of them ([`Output::sheet`]).
+    pub pyramid: bool,
 }
 
 /// What is written, and where.
@@ -75,6 +79,19 @@ pub struct Output {
 }
 
 impl Output {
+    /// Where the contact sheet of `--aov pyramid` goes: `OUT.pyramid.png` beside `OUT.exr`.
+    pub fn sheet(&self) -> PathBuf {
+        self.path.with_extension("pyramid.png")
+    }
+
+    /// Writes the contact sheet: every picture with one exposure, the image's.
+    fn write_sheet(&self, picture: &Picture, layers: &[Layer], means: Vec<Vec<Rgb>>) -> Result<(), ImageError> {
+        let exposure = self.preview.as_ref().map_or(Exposure::FromImage, |(_, exposure)| *exposure);
+        let of = |(layer, pixels): (&Layer, Vec<Rgb>)| (layer.place, Picture::new(picture.width, picture.height, pixels));
+        let pictures: Vec<_> = layers.iter().zip(means).map(of).collect();
+        write_png(&self.sheet(), &contact_sheet(&pictures, exposure.scale(picture)), Exposure::Stops(0.0))
+    }
+
     /// Writes a film.
     fn write(&self, path: &Path, film: &Film, metadata: &Metadata) -> Result<(), ImageError> {
         let picture = Picture::new(film.width(), film.height(), film.mean());
@@ -82,13 +99,19 @@ impl Output {
         if self.layers.variance {
             // Of one iteration no variance is known; NaN says so.
             let unknown = || vec![Rgb::splat(f32::NAN); picture.pixels.len()];
-            planes.push(Plane::Colour("variance", film.variance_of_mean().unwrap_or_else(unknown)));
+            planes.push(Plane::Colour("variance".into(), film.variance_of_mean().unwrap_or_else(unknown)));
         }
         if self.layers.count {
-            planes.push(Plane::Scalar("count", vec![film.eye_count() as f32; picture.pixels.len()]));
+            planes.push(Plane::Scalar("count".into(), vec![film.eye_count() as f32; picture.pixels.len()]));
         }
+        let means = film.layer_means();
+        let layers = film.layers().map_or(&[][..], LayerSums::layers);
+        planes.extend(layers.iter().zip(&means).map(|(layer, mean)| Plane::Colour(layer.name.clone().into(), mean.clone())));
         let metadata = serde_json::to_value(metadata).map_err(|e| ImageError::content(path, e.to_string()))?;
         exr::write(path, &picture, &planes, Some(&metadata))?;
+        if !layers.is_empty() && path == self.path {
+            self.write_sheet(&picture, layers, means)?;
+        }
         match &self.preview {
             Some((preview, exposure)) if path == self.path => write_png(preview, &picture, *exposure),
             _ => Ok(()),
@@ -162,7 +185,10 @@ pub fn render(
     if start > 0 && !method.stateless() {
         return Err(RenderError::Stateful { method: metadata.method, start });
     }
-    let film = Film::new(plan.size.0, plan.size.1, plan.output.layers.variance);
+    let mut film = Film::new(plan.size.0, plan.size.1, plan.output.layers.variance);
+    if plan.output.layers.pyramid {
+        film.keep_layers(LayerSums::new(method.technique_layers()?, plan.size.0 * plan.size.1));
+    }
     let (clock, stats) = (RenderClock::default(), IterationStats::default());
     let mut session = Session { plan, film, metadata, snapshots: Vec::new(), clock, stats, done: 0 };
     let result = session.iterate(method, progress, interrupt);

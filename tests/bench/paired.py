@@ -78,7 +78,9 @@ def jackknife(statistic, runs, level=LEVEL):
 
 
 def verdict(interval, bound):
-    """Is the ratio at most `bound`?"""
+    """Is the ratio at most `bound`? Without a bound it is told and no more."""
+    if bound is None:
+        return "told"
     if interval is None:
         return "undecided"
     return "met" if interval.high <= bound else "missed" if interval.low > bound else "undecided"
@@ -87,29 +89,31 @@ def verdict(interval, bound):
 @dataclasses.dataclass
 class Pair:
     """`[metric:]A/B<=BOUND[~MARGIN]`: the ratio asked for. Seeds are added until the interval's half-width is under half the margin, both as
-    logarithms. The margin is what lies between the bound and no difference, |log BOUND|, or the factor after the tilde."""
+    logarithms. The margin is what lies between the bound and no difference, |log BOUND|, or the factor after the tilde. `A/B~MARGIN` asks for
+    no bound."""
     metric: str
     a: str
     b: str
-    bound: float
+    bound: float | None
     margin: float
 
     @classmethod
     def parse(cls, text):
-        found = re.fullmatch(r"(?:(\w+):)?([^/:]+)/([^/<]+)<=([0-9.]+)(?:~([0-9.]+))?", text.replace(" ", ""))
-        if not found:
-            raise SystemExit(f"{text!r} is no pair: write A/B<=BOUND, or metric:A/B<=BOUND~MARGIN")
+        found = re.fullmatch(r"(?:(\w+):)?([^/:]+)/([^/<~]+)(?:<=([0-9.]+))?(?:~([0-9.]+))?", text.replace(" ", ""))
+        if not found or not (found[4] or found[5]):
+            raise SystemExit(f"{text!r} is no pair: write A/B<=BOUND, metric:A/B<=BOUND~MARGIN, or A/B~MARGIN where no bound is asked")
         metric, a, b, bound, margin = found.groups()
         factor = float(margin or bound)
-        if float(bound) <= 0 or factor <= 0 or factor == 1:
+        bound = float(bound) if bound else None
+        if bound is not None and bound <= 0 or factor <= 0 or factor == 1:
             raise SystemExit(f"{text!r} needs a positive bound and, where the bound is 1, a margin other than 1: {a}/{b}<=1~1.15")
-        return cls(metric or "relmse", a, b, float(bound), abs(math.log(factor)))
+        return cls(metric or "relmse", a, b, bound, abs(math.log(factor)))
 
     def narrow(self, interval):
         return interval is not None and interval.half_width < self.margin / 2
 
     def __str__(self):
-        return f"{self.metric} {self.a}/{self.b} <= {self.bound:g}"
+        return f"{self.metric} {self.a}/{self.b}" + ("" if self.bound is None else f" <= {self.bound:g}")
 
 
 def show(interval):
@@ -200,7 +204,10 @@ def self_test(repetitions=2000):
     for bad in ([1, 0, 2], [1, -1, 2], [1, math.nan, 2], [1, math.inf, 2]):
         check(f"no interval of {bad}", ratio(bad, [1, 1, 1]) is None and ratio_of_means(bad, [1, 1, 1]) is None)
     check("no interval, no verdict", verdict(None, 1) == "undecided" and not pair.narrow(None))
-    for text in ("a/b<=1", "a<=2", "a/b<=0", "a/b<=x"):
+    told = Pair.parse("cost:a/b~1.1")
+    check("a pair without a bound is told and has its margin", (told.bound, told.b, verdict(ratio([1, 2, 3], [3, 1, 2]), told.bound)) == (None, "b", "told")
+          and told.margin == math.log(1.1) and str(told) == "cost a/b")
+    for text in ("a/b<=1", "a<=2", "a/b<=0", "a/b<=x", "a/b", "a/b~1", "a/b~"):
         try:
             Pair.parse(text)
             check(f"{text} is refused", False)

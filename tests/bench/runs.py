@@ -47,13 +47,13 @@ class Program:
         with open(path, "rb") as f:
             self.hash = hashlib.sha256(f.read()).hexdigest()
 
-    def command(self, scene, options, seed, iterations, output, threads=1):
-        return [self.path, "render", "sppm", scene, "--threads", str(threads), "--iterations", str(iterations), "--seed", str(seed), "-q", "--json",
+    def command(self, scene, options, seed, iterations, output, threads=1, method="sppm"):
+        return [self.path, "render", method, scene, "--threads", str(threads), "--iterations", str(iterations), "--seed", str(seed), "-q", "--json",
                 "-o", output, *options]
 
-    def render(self, *arguments):
-        """One render of `sppm`: the document of --json."""
-        command = self.command(*arguments)
+    def render(self, *arguments, **named):
+        """One render: the document of --json."""
+        command = self.command(*arguments, **named)
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
         if done.returncode:
             raise SystemExit(f"{' '.join(command)}\nended with {done.returncode}")
@@ -139,23 +139,25 @@ def calibrated(renders, budget):
 
 class Rounds:
     """Runs of named variants on one scene, round by round (a seed each), in an order that changes with the seed. `folder` keeps images and
-    `runs.json`; a folder of the same program, scene and settings is gone on with, another is refused."""
+    `runs.json`; a folder of the same program, scene, method and settings is gone on with, another is refused."""
 
-    def __init__(self, program, scene, variants, folder, budget=None, iterations=None, first_seed=1, say=lambda text: None):
+    def __init__(self, program, scene, variants, folder, budget=None, iterations=None, first_seed=1, say=lambda text: None, method="sppm"):
         self.program, self.scene, self.variants, self.folder, self.say, self.first_seed = program, scene, variants, folder, say, first_seed
+        self.method = method
         self.budget = budget
         self.rounds = []
         self.iterations = {name: iterations for name in variants} if iterations else None
         with open(scene, "rb") as f:
             content = hashlib.sha256(f.read()).hexdigest()
-        self.about = {"program": program.hash, "scene": content, "variants": variants, "budget": budget, "iterations": iterations, "first_seed": first_seed}
+        self.about = {"program": program.hash, "scene": content, "variants": variants, "budget": budget, "iterations": iterations, "first_seed": first_seed,
+                      "method": method}
         os.makedirs(folder, exist_ok=True)
         self.file = os.path.join(folder, "runs.json")
         if os.path.exists(self.file):
             with open(self.file) as f:
                 kept = json.load(f)
-            if kept["about"] != self.about:
-                raise SystemExit(f"{folder} holds runs of another program, scene or settings: give another folder")
+            if {"method": "sppm"} | kept["about"] != self.about:
+                raise SystemExit(f"{folder} holds runs of another program, scene, method or settings: give another folder")
             self.rounds, self.iterations = kept["rounds"], kept["iterations"]
         if self.iterations is None:
             # Seed 0 is the calibration's alone.
@@ -166,7 +168,7 @@ class Rounds:
         return os.path.join(self.folder, f"{name}.{seed}.exr")
 
     def one(self, name, seed, iterations):
-        return self.program.render(self.scene, self.variants[name], seed, iterations, self.image(name, seed))
+        return self.program.render(self.scene, self.variants[name], seed, iterations, self.image(name, seed), method=self.method)
 
     def save(self):
         with open(self.file + ".new", "w") as f:
@@ -183,7 +185,8 @@ class Rounds:
             document = self.one(name, self.first_seed + k, self.iterations[name])
             found[name] = {key: document[key] for key in ("cpu_seconds", "light_paths", "rejected", "non_finite_pixels")}
             found[name]["iterations"] = self.iterations[name]
-            found[name] |= {"alpha": document["settings"]["alpha"], "photons": document["settings"].get("photons"), "b": normalisations(document),
+            # A method without merges has no radius to shrink: its noise falls as one over time.
+            found[name] |= {"alpha": document["settings"].get("alpha", 1.0), "photons": document["settings"].get("photons"), "b": normalisations(document),
                             "deposits": (document.get("diagnostics") or {}).get("deposits")}
         self.rounds.append(found)
         self.save()

@@ -27,10 +27,11 @@ class MadeUp:
     hash = "made up"
 
     def __init__(self, truth):
-        self.truth, self.generator, self.speed = truth, np.random.default_rng(3), 1.0
+        self.truth, self.generator, self.speed, self.methods = truth, np.random.default_rng(3), 1.0, set()
 
-    def render(self, scene, options, seed, iterations, output):
+    def render(self, scene, options, seed, iterations, output, method):
         name = options[-1]
+        self.methods.add(method)
         self.speed *= math.exp(self.generator.normal(0, 0.05))
         cpu = (START + EACH[name] * iterations) * self.speed * math.exp(self.generator.normal(0, 0.05))
         deviation = self.truth * math.sqrt(VARIANCE[name] / iterations) * math.exp(self.generator.normal(0, 0.03))
@@ -49,9 +50,24 @@ def measured(folder, truth, floor, **budget):
     with open(scene, "w") as f:
         f.write("<scene/>")
     entry = {"name": "made up", "scene": scene, "reference": mean, "variants": {"a": "a", "b": "b"},
-             "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57", "cost_deposit:a/b<=0.5"], **budget}
+             "pairs": ["a/b<=0.7", "nsd:a/b<=0.9", "cost:a/b<=0.5", "a/b<=0.95", "a/b<=0.57", "cost_deposit:a/b<=0.5", "a/b~1.2"], **budget}
+    program = MadeUp(truth)
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        return equal_time.measure(entry, MadeUp(truth), os.path.join(folder, f"runs {floor} {budget}"), 16, 16)
+        document = equal_time.measure(entry, program, os.path.join(folder, f"runs {floor} {budget}"), 16, 16)
+    return document | {"methods": program.methods}
+
+
+def plans():
+    """Every entry of both plans, with its file, its method and what is wrong with it."""
+    for file, method in (("samplers.toml", "sppm"), ("vcm.toml", "vcm")):
+        plan = runs.plan(os.path.join(runs.HERE, file))
+        for section in (s for s, entries in plan.items() if isinstance(entries, list)):
+            for entry in plan[section]:
+                entry = plan["defaults"] | entry
+                pairs = [paired.Pair.parse(p) for p in entry["pairs"]]
+                wrong = [v for v in entry["variants"] if v not in plan["variants"]] + [x for p in pairs for x in (p.a, p.b) if x not in entry["variants"]]
+                wrong += [p.metric for p in pairs if p.metric not in (*equal_time.PER_SEED, "nsd")]
+                yield f"{file} {section} {entry['name']}", wrong, entry.get("method", "sppm") == method
 
 
 def test():
@@ -76,6 +92,8 @@ def test():
             deposit = d["pairs"][5]
             check(f"{budget}: cost of a photon deposited", deposit["verdict"] == "met", f"{deposit['interval']['ratio']:.3f}")
             check(f"{budget}: cost of a path", d["pairs"][2]["verdict"] == "met", f"{d['pairs'][2]['interval']['ratio']:.3f}")
+            check(f"{budget}: a pair without a bound is told", d["pairs"][6]["verdict"] == "told" and d["pairs"][6]["interval"] == pair["interval"])
+            check(f"{budget}: the method is sppm if none is named", d["methods"] == {"sppm"})
             for name, row in d["rows"].items():
                 check(f"{budget}: {name} has no bias", abs(row["bias"]) < 0.05 * row["relmse_as_rendered"], f"{row['bias'] / row['relmse_as_rendered']:.4f}")
             if "budget" in budget:
@@ -86,6 +104,7 @@ def test():
                 check("without the correction for time the ratio is seen to be wrong", plain.low > 1.5, paired.show(plain))
         d = measured(folder, truth, 0.003, budget=2.0)
         pair = d["pairs"][3]
+        check("nor is a ratio told without saying so", d["pairs"][6]["verdict"] == "told (floor)")
         check("no verdict where the reference's noise is most of the error", pair["interval"]["high"] < 0.95 and pair["verdict"] == "undecided (floor)",
               f"{pair['interval']['high']:.3f}")
         d = measured(folder, truth, 0.0008, budget=2.0)
@@ -94,6 +113,15 @@ def test():
               f"{pair['interval']['ratio']:.3f}, {pair['verdict']}")
         check("and the table says so", sum("reference's noise" in note for note in d["notes"]) == 2)
         check("less the floor the known ratio is back", abs(pair["less_floor"]["ratio"] / 0.5 - 1) < 0.25, f"{pair['less_floor']['ratio']:.3f}")
+
+    with tempfile.TemporaryDirectory() as folder:
+        d = measured(folder, truth, 1e-6, iterations=20, method="vcm")
+        check("the method named is the one rendered and recorded", d["methods"] == {"vcm"} and d["method"] == "vcm")
+        program = runs.Program(__file__)
+        command = program.command("scene.xml", [], 1, 2, "out.exr", method="vcm")
+        check("and the one on the program's command line", command[1:4] == ["render", "vcm", "scene.xml"], " ".join(command[1:4]))
+    for name, wrong, method in plans():
+        check(f"{name}: the plan names what there is", not wrong and method, " ".join(wrong))
 
     # Errors by tiles: half of the tiles with a relative error of 0.3, half of 0.1, but for the epsilon.
     with tempfile.TemporaryDirectory() as folder:

@@ -111,3 +111,20 @@ fn time_windows_previews_and_progress() {
     let quiet = bench.run(&["render", method, SCENE, "-o", "a.exr", "-q"]);
     assert!(quiet.status.success() && quiet.stderr.is_empty());
 }
+
+/// Every technique of every length is a layer, and all are on one sheet beside the file.
+#[test]
+fn a_pyramid_is_layers_and_a_sheet() {
+    for (method, lit, dark) in [("bdpt", "weighted.2.vc1.R", "weighted.2.vm1.R"), ("vcm", "unweighted.2.vm1.R", "weighted.4.vc0.R")] {
+        let bench = Bench::new();
+        let run = ["render", method, SCENE, "-o", "a.exr", "--max-depth", "3", "--iterations", "2", "--aov", "pyramid", "--json", "-q"];
+        let statistics = bench.json(&run);
+        assert_eq!(bench.files(), ["a.exr", "a.pyramid.png"], "{method}");
+        assert_eq!(statistics["pyramid"], "a.pyramid.png");
+        assert!(statistics["settings"].get("pyramid").is_none(), "it changes no image");
+        let file = bench.read("a.exr");
+        let channel = |name: &str| file.channels.iter().find(|channel| channel.name == name);
+        assert!(channel(lit).is_some_and(|channel| channel.samples.iter().any(|v| *v > 0.0)), "{method}: {lit}");
+        assert!(channel(dark).is_none(), "{method}: {dark}");
+    }
+}

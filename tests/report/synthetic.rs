@@ -164,7 +164,7 @@ impl FakeStudy {
             let image = if is_last { path("") } else { path(&format!(".i{iteration:06}")) };
             if is_last || self.keep {
                 let density = picture.pixels.iter().map(|p| p.luminance()).collect();
-                let planes = if method.photons > 0 { vec![Plane::Scalar("density", density)] } else { Vec::new() };
+                let planes = if method.photons > 0 { vec![Plane::Scalar("density".into(), density)] } else { Vec::new() };
                 write(&folder.join(&image), &picture, &planes, None).expect("written");
             }
             let values = if self.references { measured(truth, &picture) } else { BTreeMap::new() };

@@ -2,6 +2,7 @@
 
 use super::iteration::Iteration;
 use super::light::{LightSide, LightVertex, Merging};
+use super::pyramid::Recorder;
 use super::technique::Technique;
 use crate::math::Rgb;
 use crate::samplers::{Key, Purpose, Stream};
@@ -20,7 +21,15 @@ use glam::{Vec2, Vec3};
 
 impl<'a> Iteration<'a, '_> {
     /// What a pixel's camera subpath finds.
-    pub(super) fn pixel(&self, x: usize, y: usize, light: &LightSide, merging: Option<&Merging>, tally: &mut Tally) -> Rgb {
+    pub(super) fn pixel<R: Recorder>(
+        &self,
+        x: usize,
+        y: usize,
+        light: &LightSide,
+        merging: Option<&Merging>,
+        tally: &mut Tally,
+        record: &mut R,
+    ) -> Rgb {
         let number = y * self.size.0 + x;
         let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stream();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
@@ -35,27 +44,27 @@ impl<'a> Iteration<'a, '_> {
         let mut sum = Rgb::BLACK;
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
             if vertex.hit.emitter.is_some() {
-                sum += tally.finite(self.hit(vertex));
+                sum += tally.finite(self.hit(vertex, record));
             }
             let goes_on = vertex.carried.edges < self.depths.max;
             if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
                 if self.techniques.connections {
-                    let found = self.next_event(vertex, &point, stream, tally);
+                    let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
                     for (partner, letters) in light.partner(number) {
-                        let found = self.connect(vertex, &point, partner, letters, tally);
+                        let found = self.connect(vertex, &point, (partner, letters), tally, record);
                         sum += tally.finite(found);
                     }
                 }
                 if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
-                    let found = self.merge(vertex, &point, merging);
+                    let found = self.merge(vertex, &point, merging, record);
                     sum += tally.finite(found);
                 }
             }
             goes_on
         });
         if let Some(departure) = departure {
-            sum += tally.finite(self.escape(&departure));
+            sum += tally.finite(self.escape(&departure, record));
         }
         sum
     }
@@ -74,12 +83,15 @@ impl<'a> Iteration<'a, '_> {
     }
 
     /// A light that was hit.
-    fn hit(&self, vertex: &SubpathVertex<'a>) -> Rgb {
+    fn hit<R: Recorder>(&self, vertex: &SubpathVertex<'a>, record: &mut R) -> Rgb {
         let emitted = self.subpaths.scene.emitted(&vertex.hit, -vertex.d, vertex.from.p);
         if emitted.radiance.is_black() || !self.emission_counts(vertex.carried.edges, vertex.letters) {
             return Rgb::BLACK;
         }
-        vertex.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.hit_weight(vertex))
+        let all = vertex.throughput * emitted.radiance;
+        let value = all * self.weigh(Technique::Connection(0), self.hit_weight(vertex));
+        record.add(vertex.carried.edges, Technique::Connection(0), value, all);
+        value
     }
 
     pub(super) fn hit_weight(&self, vertex: &SubpathVertex<'a>) -> f32 {
@@ -91,12 +103,15 @@ impl<'a> Iteration<'a, '_> {
     }
 
     /// The light all around.
-    fn escape(&self, departure: &Departure) -> Rgb {
+    fn escape<R: Recorder>(&self, departure: &Departure, record: &mut R) -> Rgb {
         let emitted = self.subpaths.scene.escaped(departure.d);
         if emitted.radiance.is_black() || !self.emission_counts(departure.edges, departure.letters) {
             return Rgb::BLACK;
         }
-        departure.throughput * emitted.radiance * self.weigh(Technique::Connection(0), self.escape_weight(departure))
+        let all = departure.throughput * emitted.radiance;
+        let value = all * self.weigh(Technique::Connection(0), self.escape_weight(departure));
+        record.add(departure.edges, Technique::Connection(0), value, all);
+        value
     }
 
     pub(super) fn escape_weight(&self, departure: &Departure) -> f32 {
@@ -107,7 +122,14 @@ impl<'a> Iteration<'a, '_> {
     }
 
     /// A light sample.
-    fn next_event<S: Stream>(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, stream: &mut S, tally: &mut Tally) -> Rgb {
+    fn next_event<S: Stream, R: Recorder>(
+        &self,
+        vertex: &SubpathVertex<'a>,
+        point: &SurfacePoint<'a>,
+        stream: &mut S,
+        tally: &mut Tally,
+        record: &mut R,
+    ) -> Rgb {
         let scene = self.subpaths.scene;
         let (u_emitter, u) = (stream.next_1d(), Vec2::from(stream.next_2d()));
         if !self.depths.contains(vertex.carried.edges + 1) {
@@ -117,16 +139,20 @@ impl<'a> Iteration<'a, '_> {
         let Some(met) = point.meet(Mode::Radiance, sample.wi) else { return Rgb::BLACK };
         let cos = point.cosine(Mode::Radiance, sample.wi);
         let weight = self.next_event_weight(&vertex.carried, point, &sample, &met);
-        let factor = self.weigh(Technique::Connection(1), weight) * cos / sample.pdf.0;
-        let mut value = vertex.throughput * met.f * sample.radiance * factor;
-        if let Some(pattern) = &self.common.paths {
-            value *= self.one_event(pattern, Letters::default(), (point, Mode::Radiance, sample.wi), vertex.letters);
-        }
-        if value.is_black() {
-            return value;
+        let way = (point, Mode::Radiance, sample.wi);
+        let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, Letters::default(), way, vertex.letters));
+        let with = |weight: f32| in_class(vertex.throughput * met.f * sample.radiance * (weight * cos / sample.pdf.0), class);
+        let value = with(self.weigh(Technique::Connection(1), weight));
+        let all = if R::ON { with(1.0) } else { value };
+        if all.is_black() {
+            return all;
         }
         tally.rays += 1;
-        if scene.visible(&point.end, &sample) { value } else { Rgb::BLACK }
+        if !scene.visible(&point.end, &sample) {
+            return Rgb::BLACK;
+        }
+        record.add(vertex.carried.edges + 1, Technique::Connection(1), value, all);
+        value
     }
 
     pub(super) fn next_event_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, sample: &DirectSample, met: &Met) -> f32 {
@@ -135,32 +161,37 @@ impl<'a> Iteration<'a, '_> {
     }
 
     /// A connection to a light vertex.
-    fn connect(
+    fn connect<R: Recorder>(
         &self,
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
-        partner: &LightVertex,
-        letters: Letters,
+        (partner, letters): (&LightVertex, Letters),
         tally: &mut Tally,
+        record: &mut R,
     ) -> Rgb {
-        if !self.depths.contains(vertex.carried.edges + partner.carried.edges + 1) {
+        let edges = vertex.carried.edges + partner.carried.edges + 1;
+        if !self.depths.contains(edges) {
             return Rgb::BLACK;
         }
         let other = partner.point(self.subpaths.scene);
         let Some(Joint { w, distance2, here, there }) = Joint::new(point, &other) else { return Rgb::BLACK };
         let weight = self.connection_weight(&vertex.carried, point, partner, &Joint { w, distance2, here, there });
         let cosines = point.cosine(Mode::Radiance, w) * other.cosine(Mode::Importance, -w);
-        let factor = self.weigh(Technique::Connection(partner.carried.edges + 1), weight) * cosines / distance2;
-        let mut value = vertex.throughput * here.f * there.f * partner.flux * factor;
-        if let Some(pattern) = &self.common.paths {
-            let ways = [(&other, Mode::Importance, -w), (point, Mode::Radiance, w)];
-            value *= self.two_events(pattern, letters, ways, vertex.letters);
-        }
-        if value.is_black() {
-            return value;
+        let ways = [(&other, Mode::Importance, -w), (point, Mode::Radiance, w)];
+        let class = self.common.paths.as_ref().map(|pattern| self.two_events(pattern, letters, ways, vertex.letters));
+        let with = |weight: f32| in_class(vertex.throughput * here.f * there.f * partner.flux * (weight * cosines / distance2), class);
+        let technique = Technique::Connection(partner.carried.edges + 1);
+        let value = with(self.weigh(technique, weight));
+        let all = if R::ON { with(1.0) } else { value };
+        if all.is_black() {
+            return all;
         }
         tally.rays += 1;
-        if self.subpaths.scene.occluded(&point.end, &partner.end) { Rgb::BLACK } else { value }
+        if self.subpaths.scene.occluded(&point.end, &partner.end) {
+            return Rgb::BLACK;
+        }
+        record.add(edges, technique, value, all);
+        value
     }
 
     pub(super) fn connection_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, partner: &LightVertex, joint: &Joint) -> f32 {
@@ -173,22 +204,32 @@ impl<'a> Iteration<'a, '_> {
     }
 
     /// Merges with the light vertices around.
-    fn merge(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging) -> Rgb {
+    fn merge<R: Recorder>(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging, record: &mut R) -> Rgb {
         let mut sum = Rgb::BLACK;
         let (n_g, n_s) = (point.end.n_g, point.frame.n);
         merging.store.query(point.end.p, self.radius, |photon, _| {
             let carried = photon.carried();
-            if !self.depths.contains(vertex.carried.edges + carried.edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
+            let edges = vertex.carried.edges + carried.edges;
+            if !self.depths.contains(edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
                 return;
             }
             let Some(met) = point.meet(Mode::Radiance, photon.wi) else { return };
-            let weight = self.weigh(Technique::Merge(carried.edges), self.merge_weight(&vertex.carried, &carried, &met));
-            if weight == 0.0 {
+            let technique = Technique::Merge(carried.edges);
+            let weight = self.weigh(technique, self.merge_weight(&vertex.carried, &carried, &met));
+            if weight == 0.0 && !R::ON {
                 return;
             }
-            let mut value = met.f * photon.flux * (cosine_ratio(point, photon.wi) * weight);
-            if let Some(pattern) = &self.common.paths {
-                value *= self.one_event(pattern, merging.letters(photon), (point, Mode::Radiance, photon.wi), vertex.letters);
+            let way = (point, Mode::Radiance, photon.wi);
+            let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, merging.letters(photon), way, vertex.letters));
+            let with = |weight: f32| in_class(met.f * photon.flux * (cosine_ratio(point, photon.wi) * weight), class);
+            let value = with(weight);
+            if R::ON {
+                record.add(
+                    edges,
+                    technique,
+                    vertex.throughput * value * self.merge_density,
+                    vertex.throughput * with(1.0) * self.merge_density,
+                );
             }
             sum += value;
         });
@@ -199,6 +240,12 @@ impl<'a> Iteration<'a, '_> {
     pub(super) fn merge_weight(&self, camera: &Carried<f32>, light: &Carried<f32>, met: &Met) -> f32 {
         self.subpaths.weights.merge(light, met.fwd, camera, met.rev)
     }
+}
+
+/// The part of a value that is of the class asked for, where one is.
+#[inline(always)]
+pub(super) fn in_class(value: Rgb, class: Option<Rgb>) -> Rgb {
+    class.map_or(value, |class| value * class)
 }
 
 /// Two surface points, one of a camera subpath and one of a light subpath, asked about the edge between them.

@@ -30,6 +30,8 @@ pub(super) struct Iteration<'a, 'w> {
     pub(super) merge_density: f32,
     /// The one technique that counts, with weight 1; `None` for all of the set with their weights.
     pub(super) alone: Option<Technique>,
+    /// Are images of single techniques kept?
+    pub(super) records: bool,
 }
 
 /// A surface point on a path, the walk that came to it, and the direction in which the path goes on.

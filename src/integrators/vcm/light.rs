@@ -1,6 +1,8 @@
 //! The light's side: light subpaths, the vertices they leave, and their connections to the camera.
 
+use super::eye::in_class;
 use super::iteration::Iteration;
+use super::pyramid::RecordedSplat;
 use super::technique::Technique;
 use crate::image::film::Splat;
 use crate::math::{Frame, Rgb};
@@ -109,6 +111,8 @@ pub(super) struct Batch {
     /// Where each path's vertices end.
     ends: Vec<u32>,
     splats: Vec<Splat>,
+    /// The same by length, with weights and without; empty unless images of techniques are kept.
+    pub(super) recorded: Vec<RecordedSplat>,
     pub(super) tally: Tally,
 }
 
@@ -134,6 +138,7 @@ impl LightSide {
         for batch in &mut batches {
             // What is in the film is done with.
             batch.splats = Vec::new();
+            batch.recorded = Vec::new();
             firsts.push(paths);
             paths += batch.ends.len();
         }
@@ -232,7 +237,7 @@ impl Iteration<'_, '_> {
             for (i, vertex) in path.vertices.iter().enumerate() {
                 let lens = stream.as_mut().map_or(Vec2::ZERO, |stream| Vec2::from(stream.next_2d()));
                 let letters = path.letters.get(i).copied().unwrap_or_default();
-                batch.splats.extend(self.splat(vertex, letters, lens, &mut batch.tally));
+                self.splat(vertex, letters, lens, batch);
             }
         }
         if self.keeps_vertices() {
@@ -242,29 +247,36 @@ impl Iteration<'_, '_> {
         batch.ends.push(batch.vertices.len() as u32);
     }
 
-    /// A light vertex connected to the camera.
-    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, tally: &mut Tally) -> Option<Splat> {
+    /// Connects a light vertex to the camera.
+    fn splat(&self, vertex: &LightVertex, letters: Letters, lens: Vec2, batch: &mut Batch) {
         let edges = vertex.carried.edges + 1;
         if !self.depths.contains(edges) {
-            return None;
+            return;
         }
-        let connection = self.subpaths.scene.camera().connect(&vertex.end, lens)?;
+        let Some(connection) = self.subpaths.scene.camera().connect(&vertex.end, lens) else { return };
         let point = vertex.point(self.subpaths.scene);
-        let met = point.meet(Mode::Importance, connection.wo)?;
+        let Some(met) = point.meet(Mode::Importance, connection.wo) else { return };
         let density = connection.pdf_pixel.0 / connection.distance2;
         let weight = self.weigh(Technique::Splat, self.splat_weight(vertex, &connection, &met));
-        if weight == 0.0 {
-            return None;
+        if weight == 0.0 && !self.records {
+            return;
         }
-        let mut value = vertex.flux * met.f * (point.cosine(Mode::Importance, connection.wo) * density * weight);
-        if let Some(pattern) = &self.common.paths {
-            value *= self.one_event(pattern, letters, (&point, Mode::Importance, connection.wo), Letters::default());
-        }
-        if value.is_black() || !self.camera_sees(vertex, &connection, tally) {
-            return None;
+        let way = (&point, Mode::Importance, connection.wo);
+        let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, letters, way, Letters::default()));
+        let cosine = point.cosine(Mode::Importance, connection.wo);
+        let with = |weight: f32| in_class(vertex.flux * met.f * (cosine * density * weight), class);
+        let value = with(weight);
+        let all = if self.records { with(1.0) } else { value };
+        if all.is_black() || !self.camera_sees(vertex, &connection, &mut batch.tally) {
+            return;
         }
         let (x, y) = (connection.film.x as usize, connection.film.y as usize);
-        Some(Splat { pixel: (y * self.size.0 + x) as u32, value: tally.finite(value) })
+        let pixel = (y * self.size.0 + x) as u32;
+        let value = batch.tally.finite(value);
+        batch.splats.push(Splat { pixel, value });
+        if self.records {
+            batch.recorded.push(RecordedSplat { pixel, edges, weighted: value, unweighted: all });
+        }
     }
 
     /// Weight of a light vertex connected to the camera.

@@ -16,6 +16,7 @@ use crate::transport::densities::scene::{PathLight, PathPlace, ScenePathError, f
 use crate::transport::mis::{Carried, Edge, LightEnd, MergeWeights, Scatter};
 use crate::transport::shading::SurfacePoint;
 use crate::transport::subpath::{Departure, Start, SubpathVertex};
+use crate::transport::walk::Tally;
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
