@@ -10,8 +10,8 @@ mod light;
 mod settings;
 mod technique;
 
+use super::eye::Eye;
 use super::photon_settings::PhotonSettings;
-use super::sppm::eye::Eye;
 use super::{Common, Integrator, IterationStats, MethodError};
 use crate::image::film::Film;
 use crate::photons::Grid;
