@@ -3,13 +3,19 @@
 //! An iteration traces light subpaths, connects their vertices to the camera and keeps them; then it traces one camera subpath a pixel, which
 //! hits emitters, samples lights, is connected to the vertices of one light subpath, and merges with those of all that lie near. Weights are
 //! those of `transport::mis`.
+//!
+//! A sampler with a target needs to know first what the camera sees (`aimed`).
 
+mod aimed;
 mod eye;
 mod iteration;
 mod light;
+mod pairing;
 mod settings;
 mod technique;
 
+use super::aimed::Aimed;
+use super::chains::ChainReport;
 use super::eye::Eye;
 use super::photon_settings::PhotonSettings;
 use super::{Common, Integrator, IterationStats, MethodError};
@@ -26,6 +32,7 @@ use crate::transport::subpath::{Photons, Subpaths};
 use crate::transport::walk::Tally;
 use iteration::Iteration;
 use light::{Batch, LightSide, Merging};
+use serde_json::{Value, json};
 
 pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
 pub use technique::{Technique, TechniqueName};
@@ -43,6 +50,8 @@ struct Engine<'a> {
     /// What earlier iterations tell of how dense photons lie; `None` for heuristics that do not ask.
     density: Option<DensityMap>,
     alone: Option<Technique>,
+    /// Chains and their targets; `None` with the uniform sampler.
+    aimed: Option<Aimed>,
 }
 
 impl<'a> Engine<'a> {
@@ -55,7 +64,19 @@ impl<'a> Engine<'a> {
         photons: PhotonSettings,
         alone: Option<Technique>,
     ) -> Self {
-        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone }
+        let ladder = if techniques.merges { photons.ladder_of_one_radius() } else { photons.ladder() };
+        let aimed = ladder.map(|ladder| Aimed::new(&photons, &ladder, common.seed));
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone, aimed }
+    }
+
+    /// Camera subpaths to their first vertex that merges, or would.
+    fn eye(&self) -> Eye<'a> {
+        Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() }
+    }
+
+    /// Light subpaths an iteration, at most.
+    fn light_paths(&self) -> u64 {
+        self.photons.photon_count(self.size)
     }
 
     /// Roughness from which a surface merges.
@@ -65,7 +86,7 @@ impl<'a> Engine<'a> {
 
     fn sampling(&self, i: u64) -> Sampling {
         let radius = self.radius * shrink(i, self.photons.alpha);
-        let light_paths = self.photons.photon_count(self.size) as f64;
+        let light_paths = self.light_paths() as f64;
         Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
     }
 
@@ -88,8 +109,7 @@ impl<'a> Engine<'a> {
 
     /// Light subpaths of an iteration, their splats in the film.
     fn shoot(&self, iteration: &Iteration<'_, '_>, film: &mut Film, stats: &mut IterationStats) -> LightSide {
-        // A path of one edge is a light seen directly, and left to the camera's side.
-        let count = if iteration.depths.max > 1 { self.photons.photon_count(self.size) } else { 0 };
+        let count = if shines(iteration) { self.light_paths() } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
         let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
@@ -98,8 +118,13 @@ impl<'a> Engine<'a> {
         if self.techniques.light_tracing {
             film.add_splats(&draw.batches, count);
         }
-        LightSide::new(draw)
+        LightSide::new(draw.batches, None)
     }
+}
+
+/// Do light subpaths count? A path of one edge is a light seen directly, and left to the camera's side.
+fn shines(iteration: &Iteration<'_, '_>) -> bool {
+    iteration.depths.max > 1
 }
 
 impl Integrator for Engine<'_> {
@@ -109,16 +134,19 @@ impl Integrator for Engine<'_> {
             self.radius = match self.photons.radius {
                 Some(radius) => radius,
                 None => {
-                    let eye = Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() };
                     // Where no pixel's centre shows a surface that merges, hardly any subpath will find one; a scene without extent has none.
                     let fallback = |extent: f32| if extent > 0.0 { 1e-3 * extent } else { 1.0 };
-                    let footprint = eye.median_footprint(&mut stats).unwrap_or_else(|| fallback(self.scene.bounding_sphere().1));
+                    let footprint = self.eye().median_footprint(&mut stats).unwrap_or_else(|| fallback(self.scene.bounding_sphere().1));
                     self.photons.radius_pixels.unwrap_or(1.0) * f64::from(footprint)
                 }
             };
         }
         if self.heuristic.asks_density() && self.techniques.merges {
             self.density = Some(DensityMap::new(DensitySettings::for_radius(self.radius as f32)));
+        }
+        if let Some(mut aimed) = self.aimed.take() {
+            aimed.prepare(&self.eye(), self.measured_radius(0).0, &mut stats);
+            self.aimed = Some(aimed);
         }
         Ok(stats)
     }
@@ -127,12 +155,16 @@ impl Integrator for Engine<'_> {
         let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
         let sampling = self.sampling(i);
         let weights = Weights::new(&sampling);
-        let mut density = self.density.take();
+        let (mut density, mut aimed) = (self.density.take(), self.aimed.take());
         let area = sampling.merge_area() as f32;
         let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
         let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
         let iteration = self.iteration(i, &sampling, &weights, photons);
-        let light = self.shoot(&iteration, film, &mut stats);
+        let independent = !shines(&iteration) || aimed.as_mut().is_none_or(|aimed| aimed.rests(self.light_paths()));
+        let light = match &mut aimed {
+            Some(aimed) if !independent => self.shoot_aimed(aimed, &iteration, film, &mut stats),
+            _ => self.shoot(&iteration, film, &mut stats),
+        };
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
         let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
         film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
@@ -141,16 +173,24 @@ impl Integrator for Engine<'_> {
             let grid = merging.store.grid();
             map.insert(grid.len(), |place| grid.position(place));
         }
-        self.density = density;
+        (self.density, self.aimed) = (density, aimed);
         stats
     }
 
     fn stateless(&self) -> bool {
-        !(self.techniques.merges && self.heuristic.asks_density())
+        self.aimed.is_none() && !(self.techniques.merges && self.heuristic.asks_density())
     }
 
     fn radius(&self) -> Option<f64> {
         self.techniques.merges.then_some(self.radius)
+    }
+
+    fn diagnostics(&self) -> Option<Value> {
+        self.aimed.as_ref().map(|aimed| json!({ "sampler": aimed.report().to_json() }))
+    }
+
+    fn chains(&self) -> Option<ChainReport> {
+        self.aimed.as_ref().map(Aimed::report)
     }
 }
 

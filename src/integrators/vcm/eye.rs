@@ -42,9 +42,10 @@ impl<'a> Iteration<'a, '_> {
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally);
                     sum += tally.finite(found);
-                    for (partner, letters) in light.partner(number) {
+                    let (factor, partners) = light.partner(number);
+                    for (partner, letters) in partners {
                         let found = self.connect(vertex, &point, partner, letters, tally);
-                        sum += tally.finite(found);
+                        sum += tally.finite(found * factor);
                     }
                 }
                 if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
