@@ -42,11 +42,13 @@ pub enum Purpose {
     Test = 6,
     /// Which subpaths are joined with which, for all pixels of an iteration together; the index is 0.
     Pair = 7,
+    /// A camera subpath that finds where light is wanted and adds nothing to the image; the index is the pixel.
+    Look = 8,
 }
 
 impl Purpose {
     /// Every purpose, with the name the command line uses for it.
-    pub const ALL: [(Purpose, &'static str); 7] = [
+    pub const ALL: [(Purpose, &'static str); 8] = [
         (Purpose::Camera, "camera"),
         (Purpose::Light, "light"),
         (Purpose::Connect, "connect"),
@@ -54,6 +56,7 @@ impl Purpose {
         (Purpose::Pilot, "pilot"),
         (Purpose::Test, "test"),
         (Purpose::Pair, "pair"),
+        (Purpose::Look, "look"),
     ];
 }
 

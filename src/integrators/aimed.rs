@@ -6,10 +6,10 @@ use super::IterationStats;
 use super::chains::{ChainReport, RegionReport};
 use super::eye::{Eye, Radius, Seen};
 use super::photon_settings::{LadderPlan, PhotonSettings, RegionKind};
-use crate::samplers::{Draw, Drawn, Ladder, LightPathSpace, PhotonSampler};
+use crate::samplers::{Draw, Drawn, Purpose, Ladder, LightPathSpace, PhotonSampler};
 use crate::targets::Arrivals;
 use crate::targets::aim::{Aim, Aimer, Place, Rung};
-use crate::targets::aimed::{AimedPath, AimedPaths};
+use crate::targets::aimed::{AimedPath, AimedPaths, Gain};
 use crate::targets::cells::Site;
 use crate::targets::deposits::{Collected, halves};
 use crate::targets::points::{MeasurementPoint, PointGrid, Points};
@@ -100,6 +100,11 @@ impl Aimed {
         Sights { aimer, points, aims }
     }
 
+    /// How densely the iteration's light paths will lie, as far as earlier draws tell.
+    pub(super) fn gain<'s>(&self, sights: &'s Sights<'_>) -> Option<Gain<'s>> {
+        self.ladder.densities().map(|densities| Gain::new(sights.aimer.cells(), &self.rungs, &densities))
+    }
+
     /// Draws `paths` light paths of iteration `i`, as [`PhotonSampler::draw`] does.
     pub(super) fn draw<L: LightPathSpace<Path: Arrivals>, A: Send>(
         &mut self,
@@ -143,11 +148,11 @@ impl Aimed {
     }
 }
 
-/// Camera subpaths of iteration `i`: its measurement points in pixel order, and what `keep` made of every row, from the top.
+/// Camera subpaths of an iteration, for the purpose that their keys have: its measurement points in pixel order, and what `keep` made of every row, from the top.
 pub(super) fn look<'a, A: Default + Send>(
     eye: &Eye<'a>,
     radius: Radius,
-    i: u64,
+    key: (u64, Purpose),
     stats: &mut IterationStats,
     keep: impl Fn(&mut A, &Seen<'a>) + Sync,
 ) -> (Vec<A>, Vec<MeasurementPoint<'a>>) {
@@ -156,7 +161,7 @@ pub(super) fn look<'a, A: Default + Send>(
         let (mut tally, mut kept) = (Tally::default(), A::default());
         let mut points = Vec::with_capacity(width);
         for pixel in y * width..(y + 1) * width {
-            let seen = eye.sample(i, pixel, radius, &mut tally);
+            let seen = eye.sample(key, pixel, radius, &mut tally);
             keep(&mut kept, &seen);
             points.extend(seen.measured);
         }
@@ -201,7 +206,7 @@ mod tests {
     use super::*;
     use crate::integrators::Common;
     use crate::photons::radius::shrink;
-    use crate::samplers::{Key, Purpose};
+    use crate::samplers::Key;
     use crate::scene::Scene;
     use crate::scene::mitsuba::{LoadOptions, load};
     use crate::targets::cells::CellSearch;
@@ -220,7 +225,7 @@ mod tests {
 
     fn measured<'a>(eye: &Eye<'a>, i: u64, shrink: f32, stats: &mut IterationStats) -> Vec<MeasurementPoint<'a>> {
         let Radius::Footprints(first) = RADIUS else { panic!("footprints") };
-        look(eye, Radius::Footprints(first * shrink), i, stats, |(): &mut (), _| {}).1
+        look(eye, Radius::Footprints(first * shrink), (i, Purpose::Camera), stats, |(): &mut (), _| {}).1
     }
 
     fn indexed<'a>(eye: &Eye<'a>, measured: Vec<MeasurementPoint<'a>>) -> Points<'a> {

@@ -63,9 +63,9 @@ impl<'a> Eye<'a> {
         self.size.0 * self.size.1
     }
 
-    /// An iteration's subpath of a pixel.
-    pub(super) fn sample(&self, iteration: u64, pixel: usize, radius: Radius, tally: &mut Tally) -> Seen<'a> {
-        let mut stream = pixel_stream(self.common.seed, iteration, pixel, Purpose::Camera);
+    /// An iteration's subpath of a pixel, for the purpose that its key has.
+    pub(super) fn sample(&self, (iteration, purpose): (u64, Purpose), pixel: usize, radius: Radius, tally: &mut Tally) -> Seen<'a> {
+        let mut stream = pixel_stream(self.common.seed, iteration, pixel, purpose);
         let jitter = Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         self.measure(pixel, jitter, lens, radius, &mut stream, tally)

@@ -74,6 +74,11 @@ impl<'a> Engine<'a> {
         Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() }
     }
 
+    /// Do light subpaths count? A path of one edge is a light seen directly, and left to the camera's side.
+    fn shines(&self) -> bool {
+        self.common.max_depth.is_none_or(|most| most > 1)
+    }
+
     /// Light subpaths an iteration, at most.
     fn light_paths(&self) -> u64 {
         self.photons.photon_count(self.size)
@@ -103,13 +108,14 @@ impl<'a> Engine<'a> {
             depths: DepthRange { min: self.common.min_depth, max: self.common.max_depth.unwrap_or(u32::MAX) },
             radius: sampling.radius as f32,
             merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
+            gain: None,
             alone: self.alone,
         }
     }
 
     /// Light subpaths of an iteration, their splats in the film.
     fn shoot(&self, iteration: &Iteration<'_, '_>, film: &mut Film, stats: &mut IterationStats) -> LightSide {
-        let count = if shines(iteration) { self.light_paths() } else { 0 };
+        let count = if self.shines() { self.light_paths() } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
         let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
@@ -120,11 +126,6 @@ impl<'a> Engine<'a> {
         }
         LightSide::new(draw.batches, None)
     }
-}
-
-/// Do light subpaths count? A path of one edge is a light seen directly, and left to the camera's side.
-fn shines(iteration: &Iteration<'_, '_>) -> bool {
-    iteration.depths.max > 1
 }
 
 impl Integrator for Engine<'_> {
@@ -153,17 +154,28 @@ impl Integrator for Engine<'_> {
 
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
         let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
-        let sampling = self.sampling(i);
-        let weights = Weights::new(&sampling);
         let (mut density, mut aimed) = (self.density.take(), self.aimed.take());
+        let rests = aimed.as_mut().is_some_and(|aimed| !self.shines() || aimed.rests(self.light_paths()));
+        let mut chains = aimed.as_mut().filter(|_| !rests);
+        let sights = chains.as_mut().map(|aimed| self.aim(aimed, i, &mut stats));
+        let gain = chains.as_ref().zip(sights.as_ref()).and_then(|(aimed, sights)| aimed.gain(sights)).filter(|_| std::env::var("ISO_NOGAIN").is_err());
+        let mut sampling = self.sampling(i);
+        if gain.is_some() && self.techniques.merges {
+            sampling.heuristic = sampling.heuristic.by_photons();
+        }
+        let weights = Weights::new(&sampling);
         let area = sampling.merge_area() as f32;
         let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
-        let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
-        let iteration = self.iteration(i, &sampling, &weights, photons);
-        let independent = !shines(&iteration) || aimed.as_mut().is_none_or(|aimed| aimed.rests(self.light_paths()));
-        let light = match &mut aimed {
-            Some(aimed) if !independent => self.shoot_aimed(aimed, &iteration, film, &mut stats),
-            _ => self.shoot(&iteration, film, &mut stats),
+        let fewer = gain.map(|gain| move |end: &Endpoint| gain.at(end).recip());
+        let photons = match (&photons, &fewer) {
+            (Some(photons), _) => Some(photons as Photons<'_>),
+            (None, Some(fewer)) => Some(fewer as Photons<'_>),
+            (None, None) => None,
+        };
+        let iteration = Iteration { gain, ..self.iteration(i, &sampling, &weights, photons) };
+        let (light, sums) = match (&mut chains, &sights) {
+            (Some(aimed), Some(sights)) => self.shoot_aimed((aimed, sights), &iteration, film, &mut stats),
+            _ => (self.shoot(&iteration, film, &mut stats), None),
         };
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
         let sample = |tally: &mut Tally, x: usize, y: usize| iteration.pixel(x, y, &light, merging.as_ref(), tally);
@@ -172,6 +184,9 @@ impl Integrator for Engine<'_> {
         if let (Some(map), Some(merging)) = (&mut density, &merging) {
             let grid = merging.store.grid();
             map.insert(grid.len(), |place| grid.position(place));
+        }
+        if let (Some(aimed), Some(sights)) = (chains, sights) {
+            aimed.learn(sights, sums.as_deref());
         }
         (self.density, self.aimed) = (density, aimed);
         stats

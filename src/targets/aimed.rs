@@ -5,7 +5,38 @@ use super::cells::{CellSearch, Cells, Reached};
 use super::light_paths::Arrivals;
 use super::points::{Points, Search};
 use super::tallies::Tallies;
+use crate::scene::hit::Endpoint;
 use crate::samplers::{CELLS, LightPathSpace, Stream};
+
+/// How densely light paths lie, over as many independent ones, by the place of a vertex: what a ladder makes of the cells.
+#[derive(Clone, Copy, Debug)]
+pub struct Gain<'a> {
+    cells: &'a Cells,
+    /// Of a path that no target likes.
+    unseen: f32,
+    /// Of one that reaches a cell: a constant, and factors of the cell's kernel and full targets.
+    seen: f32,
+    kernel: f32,
+    full: f32,
+}
+
+impl<'a> Gain<'a> {
+    /// `densities` are the factors of the rungs' targets.
+    pub fn new(cells: &'a Cells, rungs: &[Rung], densities: &[f64]) -> Self {
+        let of = |wanted: Rung| rungs.iter().zip(densities).find(|(rung, _)| **rung == wanted).map_or(0.0, |(_, density)| *density as f32);
+        let mut unseen = of(Rung::Uniform);
+        let seen = unseen + of(Rung::Visibility);
+        if let Some(v) = std::env::var("ISO_UNSEEN").ok().and_then(|v| v.parse().ok()) { unseen = v; }
+        Self { cells, unseen, seen, kernel: of(Rung::Kernel), full: of(Rung::Target) }
+    }
+
+    /// At a vertex: that of paths whose best vertex is this one.
+    #[inline]
+    pub fn at(&self, end: &Endpoint) -> f32 {
+        let worth = |[kernel, full]: [f32; 2]| self.seen + self.kernel * kernel + self.full * full;
+        self.cells.worth(end).map_or(self.unseen, worth)
+    }
+}
 
 /// A light path and what its vertices are worth.
 #[derive(Clone, Debug, Default)]

@@ -12,6 +12,7 @@ use super::aim::Aim;
 use super::light_paths::Arrival;
 use super::points::{DepthRange, MeasurementPoint, kernel_size};
 use crate::math::fetch;
+use crate::scene::hit::Endpoint;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 use table::{Key, Probe, Table};
@@ -291,6 +292,25 @@ impl Cells {
     #[inline(always)]
     fn bucket(&self, widest: IVec3) -> u32 {
         Key { cell: widest, level: 0 }.hash() & (self.present.len() as u32 - 1)
+    }
+
+    /// Kernel and full target at a place of a surface, whichever of its sides light comes from; `None` outside.
+    #[inline]
+    pub fn worth(&self, end: &Endpoint) -> Option<[f32; 2]> {
+        let bucket = self.bucket(Key::of(end.p, *self.inverse_sides.first()?, 0).cell);
+        let mut levels = self.present[bucket as usize];
+        let faces = face(end.n_g) | face(-end.n_g);
+        let mut found: Option<[f32; 2]> = None;
+        while levels != 0 {
+            let level = levels.trailing_zeros() as usize;
+            levels &= levels - 1;
+            let probe = self.worths.probe(Key::of(end.p, self.inverse_sides[level], level as i32));
+            if let Some((_, worth)) = self.worths.at(&probe).filter(|(_, worth)| worth.gate.faces & faces != 0) {
+                let [kernel, full] = found.unwrap_or_default();
+                found = Some([kernel.max(worth.kernel), full.max(worth.full)]);
+            }
+        }
+        found
     }
 
     /// What a path's vertices are worth: the largest target of the cells that they lie in [STF (11), (12)].

@@ -5,6 +5,7 @@ use super::{Counts, Glossy, IterationStats, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
+use crate::samplers::Purpose;
 use crate::targets::LightVertex;
 use crate::targets::deposits::{Deposits, collect};
 use crate::transport::walk::Tally;
@@ -20,7 +21,7 @@ impl Sppm<'_> {
     /// An iteration: camera subpaths first, then light paths aimed at what they found.
     pub(super) fn iterate_aimed(&self, aimed: &mut Aimed, i: u64, film: &mut Film, stats: &mut IterationStats) -> Counts {
         let eye = &self.eye;
-        let (rows, measured) = look(eye, self.radius_at(i), i, stats, |row: &mut Row, seen| {
+        let (rows, measured) = look(eye, self.radius_at(i), (i, Purpose::Camera), stats, |row: &mut Row, seen| {
             row.glossy.see(seen);
             row.values.push(self.emission(seen));
         });

@@ -4,7 +4,7 @@
 //! what it splats are multiplied by `N W_p`, so that all that follows may take the path for an independent one. Weights of techniques are those of
 //! uniform densities: they sum to 1 for every path whoever draws it.
 
-use super::super::aimed::{Aimed, look};
+use super::super::aimed::{Aimed, Sights, look};
 use super::super::eye::Radius;
 use super::super::IterationStats;
 use super::Engine;
@@ -14,7 +14,7 @@ use super::pairing::Pairing;
 use crate::image::film::Film;
 use crate::photons::radius::shrink;
 use crate::samplers::{Key, Purpose};
-use crate::targets::deposits::{Deposits, collect};
+use crate::targets::deposits::{Collected, Deposits, collect};
 use rayon::prelude::*;
 
 impl Engine<'_> {
@@ -27,23 +27,30 @@ impl Engine<'_> {
         (Radius::World((self.radius * factor) as f32), factor)
     }
 
+    /// Where the camera sees something in iteration `i`. Not by the subpaths that make its image: weights are made of what is seen here, and must not
+    /// know the paths they weigh.
+    pub(super) fn aim<'s>(&'s self, aimed: &mut Aimed, i: u64, stats: &mut IterationStats) -> Sights<'s> {
+        let eye = self.eye();
+        let (radius, shrink) = self.measured_radius(i);
+        let (_, measured) = look(&eye, radius, (i, Purpose::Look), stats, |(): &mut (), _| {});
+        stats.camera_paths += eye.pixels() as u64;
+        aimed.aim(&eye, measured, shrink)
+    }
+
     /// Light subpaths of an iteration, aimed at the first vertices of its camera subpaths; their splats in the film.
     pub(super) fn shoot_aimed(
         &self,
-        aimed: &mut Aimed,
+        (aimed, sights): (&mut Aimed, &Sights<'_>),
         iteration: &Iteration<'_, '_>,
         film: &mut Film,
         stats: &mut IterationStats,
-    ) -> LightSide {
-        let (eye, count) = (self.eye(), self.light_paths());
-        let (radius, shrink) = self.measured_radius(iteration.index);
-        let (_, measured) = look(&eye, radius, iteration.index, stats, |(): &mut (), _| {});
-        let sights = aimed.aim(&eye, measured, shrink);
+    ) -> (LightSide, Option<Vec<Collected>>) {
+        let count = self.light_paths();
         let points = &sights.points;
         let start = || (sights.has_regions().then(|| Deposits::new(points.all().len(), true)), Batch::default());
         let draw = aimed.draw(
             *iteration,
-            &sights,
+            sights,
             (iteration.index, count),
             start,
             |(deposits, batch): &mut (Option<Deposits<()>>, Batch), path, drawn| {
@@ -57,7 +64,6 @@ impl Engine<'_> {
         let (deposits, mut batches): (Vec<_>, Vec<_>) = draw.batches.into_iter().unzip();
         let deposits: Option<Vec<Deposits<()>>> = deposits.into_iter().collect();
         let sums = deposits.map(|deposits| collect(&deposits, &draw.scales, points.all().len()));
-        aimed.learn(sights, sums.as_deref());
 
         let weights: Vec<Vec<f32>> = batches.par_iter_mut().map(|batch| batch.weigh(&draw.scales, count)).collect();
         batches.iter().for_each(|batch| stats.count(&batch.tally));
@@ -66,11 +72,8 @@ impl Engine<'_> {
         }
         let pairing = self.techniques.connections.then(|| {
             let mut stream = Key { seed: self.common.seed, iteration: iteration.index, index: 0, purpose: Purpose::Pair }.stream();
-            let flat = std::env::var("ISO_PAIR").is_ok();
-            let mut weights = weights;
-            if flat { weights.iter_mut().flatten().for_each(|w| *w = 1.0); }
             Pairing::new(&weights.concat(), iteration.pixels() as usize, count, &mut stream)
         });
-        LightSide::new(batches, pairing)
+        (LightSide::new(batches, pairing), sums)
     }
 }

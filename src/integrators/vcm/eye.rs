@@ -64,7 +64,7 @@ impl<'a> Iteration<'a, '_> {
     /// What the first vertex of a camera subpath carries.
     pub(super) fn seen(&self, seen: &CameraRay, hit: &Hit, share: f32) -> Carried<f32> {
         let edge = Edge::between(1.0, seen.ray.d.dot(hit.end.n_g).abs(), seen.end.p.distance_squared(hit.end.p));
-        self.subpaths.weights.from_camera(seen.pdf_pixel.0, edge, share)
+        self.subpaths.weights.from_camera(self.pixel_density(seen.pdf_pixel.0, &hit.end), edge, share)
     }
 
     /// Does emission count that is met after so many edges?
