@@ -6,7 +6,7 @@ use super::IterationStats;
 use super::chains::{ChainReport, RegionReport};
 use super::eye::{Eye, Radius, Seen};
 use super::photon_settings::{LadderPlan, PhotonSettings, RegionKind};
-use crate::samplers::{Draw, Drawn, Purpose, Ladder, LightPathSpace, PhotonSampler};
+use crate::samplers::{Draw, Drawn, Ladder, LightPathSpace, PhotonSampler, Purpose};
 use crate::targets::Arrivals;
 use crate::targets::aim::{Aim, Aimer, Place, Rung};
 use crate::targets::aimed::{AimedPath, AimedPaths, Gain};
@@ -237,7 +237,8 @@ mod tests {
     fn paths(eye: &Eye<'_>, aimer: &Aimer, points: &Points<'_>) -> Vec<(usize, u32)> {
         let (mut path, mut touches) = (LightPath::default(), Vec::new());
         let depths = eye.depths();
-        let light = LightPaths { scene: eye.scene, roughness_threshold: eye.threshold, max_depth: depths.max - 1, rr_depth: eye.common.rr_depth };
+        let light =
+            LightPaths { scene: eye.scene, roughness_threshold: eye.threshold, max_depth: depths.max - 1, rr_depth: eye.common.rr_depth };
         let of_path = |index| {
             let mut stream = Key { seed: 5, iteration: 0, index, purpose: Purpose::Test }.stream();
             light.trace(&mut stream, &mut path);

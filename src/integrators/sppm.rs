@@ -157,7 +157,8 @@ impl Integrator for Sppm<'_> {
         let counts = match self.aimed.take() {
             Some(mut aimed) => {
                 let rests = aimed.rests(self.photon_count);
-                let counts = if rests { self.iterate_uniform(i, film, &mut stats) } else { self.iterate_aimed(&mut aimed, i, film, &mut stats) };
+                let counts =
+                    if rests { self.iterate_uniform(i, film, &mut stats) } else { self.iterate_aimed(&mut aimed, i, film, &mut stats) };
                 self.aimed = Some(aimed);
                 counts
             }

@@ -158,7 +158,7 @@ impl Integrator for Engine<'_> {
         let rests = aimed.as_mut().is_some_and(|aimed| !self.shines() || aimed.rests(self.light_paths()));
         let mut chains = aimed.as_mut().filter(|_| !rests);
         let sights = chains.as_mut().map(|aimed| self.aim(aimed, i, &mut stats));
-        let gain = chains.as_ref().zip(sights.as_ref()).and_then(|(aimed, sights)| aimed.gain(sights)).filter(|_| std::env::var("ISO_NOGAIN").is_err());
+        let gain = chains.as_ref().zip(sights.as_ref()).and_then(|(aimed, sights)| aimed.gain(sights));
         let mut sampling = self.sampling(i);
         if gain.is_some() && self.techniques.merges {
             sampling.heuristic = sampling.heuristic.by_photons();

@@ -5,8 +5,8 @@ use super::cells::{CellSearch, Cells, Reached};
 use super::light_paths::Arrivals;
 use super::points::{Points, Search};
 use super::tallies::Tallies;
-use crate::scene::hit::Endpoint;
 use crate::samplers::{CELLS, LightPathSpace, Stream};
+use crate::scene::hit::Endpoint;
 
 /// How densely light paths lie, over as many independent ones, by the place of a vertex: what a ladder makes of the cells.
 #[derive(Clone, Copy, Debug)]
@@ -24,9 +24,8 @@ impl<'a> Gain<'a> {
     /// `densities` are the factors of the rungs' targets.
     pub fn new(cells: &'a Cells, rungs: &[Rung], densities: &[f64]) -> Self {
         let of = |wanted: Rung| rungs.iter().zip(densities).find(|(rung, _)| **rung == wanted).map_or(0.0, |(_, density)| *density as f32);
-        let mut unseen = of(Rung::Uniform);
+        let unseen = of(Rung::Uniform);
         let seen = unseen + of(Rung::Visibility);
-        if let Some(v) = std::env::var("ISO_UNSEEN").ok().and_then(|v| v.parse().ok()) { unseen = v; }
         Self { cells, unseen, seen, kernel: of(Rung::Kernel), full: of(Rung::Target) }
     }
 

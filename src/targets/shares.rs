@@ -44,3 +44,57 @@ impl Shares {
         factors
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samplers::{Ladder, LadderSettings, LightPathSpace, PhotonSampler, Stream};
+
+    /// Paths are points of the unit square; the target likes a disk.
+    struct Disk;
+
+    fn inside(p: &[f32; 2]) -> bool {
+        (p[0] - 0.3).hypot(p[1] - 0.4) < 0.15
+    }
+
+    impl LightPathSpace for Disk {
+        type Path = [f32; 2];
+        fn trace<S: Stream>(&self, stream: &mut S, path: &mut [f32; 2]) {
+            *path = stream.next_2d();
+        }
+        fn targets(&self, path: &[f32; 2], values: &mut [f64]) {
+            values[0] = 1.0;
+            values[1..].fill(f64::from(u8::from(inside(path))));
+        }
+    }
+
+    /// What paths count for adds up to the measure of the space, and to that of the disk within it: the sum is over a path's strata, and no
+    /// stratum alone has it.
+    #[test]
+    fn factors_add_up_to_the_space() {
+        let mut ladder = Ladder::new(LadderSettings { seed: 5, rungs: 2, ensembles: 8, ..LadderSettings::default() });
+        let (draws, mut sums) = (24, Vec::new());
+        for draw in 0..draws {
+            let keep = |(shares, places): &mut (Shares, Vec<bool>), path: &[f32; 2], drawn: &[Drawn]| {
+                shares.add(drawn);
+                places.push(inside(path));
+            };
+            let drawn = ladder.draw(&Disk, draw, 20_000, <(Shares, Vec<bool>)>::default, keep);
+            let mut sum = [0.0; 2];
+            for (shares, places) in &drawn.batches {
+                assert_eq!(shares.paths() as usize, places.len());
+                for ([factor, _], inside) in shares.factors(&drawn.scales).iter().zip(places) {
+                    sum[0] += factor;
+                    sum[1] += if *inside { *factor } else { 0.0 };
+                }
+            }
+            sums.push(sum);
+        }
+        for (k, expected) in [1.0, std::f64::consts::PI * 0.15 * 0.15].into_iter().enumerate() {
+            let mean = sums.iter().map(|sum| sum[k]).sum::<f64>() / draws as f64;
+            let variance = sums.iter().map(|sum| (sum[k] - mean).powi(2)).sum::<f64>() / (draws - 1) as f64;
+            let error = (variance / draws as f64).sqrt();
+            assert!((mean - expected).abs() < 4.0 * error && error < 0.01 * expected, "{k}: {mean} +- {error}, not {expected}");
+        }
+    }
+}

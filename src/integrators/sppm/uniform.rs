@@ -5,7 +5,7 @@ use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
 use crate::photons::{Photon, Store};
-use crate::samplers::{Purpose, Drawn, PhotonSampler, Uniform};
+use crate::samplers::{Drawn, PhotonSampler, Purpose, Uniform};
 use crate::targets::LightPath;
 use crate::targets::points::MeasurementPoint;
 use crate::transport::merge::{accepts, merge};

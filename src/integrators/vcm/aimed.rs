@@ -4,9 +4,9 @@
 //! what it splats are multiplied by `N W_p`, so that all that follows may take the path for an independent one. Weights of techniques are those of
 //! uniform densities: they sum to 1 for every path whoever draws it.
 
+use super::super::IterationStats;
 use super::super::aimed::{Aimed, Sights, look};
 use super::super::eye::Radius;
-use super::super::IterationStats;
 use super::Engine;
 use super::iteration::Iteration;
 use super::light::{Batch, LightSide};

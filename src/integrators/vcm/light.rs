@@ -340,7 +340,8 @@ impl Iteration<'_, '_> {
 
     /// Weight of a light vertex connected to the camera.
     pub(super) fn splat_weight(&self, vertex: &LightVertex, connection: &CameraConnection, met: &Met) -> f32 {
-        let found = self.pixel_density(connection.pdf_pixel.0, &vertex.end) * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
+        let found =
+            self.pixel_density(connection.pdf_pixel.0, &vertex.end) * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
         self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found })
     }
 

@@ -84,9 +84,11 @@ impl VcmSettings {
         whole_mixture(&self.photons)?;
         let asks_map = matches!(self.merge_weights, MergeWeightsName::VcmPlus | MergeWeightsName::VcmStar);
         if asks_map && self.photons.sampler != SamplerName::Uniform {
-            return Err("--merge-weights vcm-plus and vcm-star count independent photons: give --sampler uniform, or --merge-weights balance \
+            return Err(
+                "--merge-weights vcm-plus and vcm-star count independent photons: give --sampler uniform, or --merge-weights balance \
                         or power"
-                .into());
+                    .into(),
+            );
         }
         if self.photons.glossy_paths != GlossyPaths::Keep {
             return Err("--glossy-paths drop is for sppm: here every path is counted by some technique".into());
@@ -99,8 +101,12 @@ impl VcmSettings {
 /// that are not the mixture's count them wrong.
 fn whole_mixture(photons: &PhotonSettings) -> Result<(), String> {
     match photons.chains.combine {
-        Some(CombineName::Average) => Err("--combine average leaves out light paths that no target likes, which are needed here: give mis".into()),
-        Some(CombineName::Last) => Err("--combine last leaves out light paths that no target likes, which are needed here: give mis".into()),
+        Some(CombineName::Average) => {
+            Err("--combine average leaves out light paths that no target likes, which are needed here: give mis".into())
+        }
+        Some(CombineName::Last) => {
+            Err("--combine last leaves out light paths that no target likes, which are needed here: give mis".into())
+        }
         Some(CombineName::Mis) | None => Ok(()),
     }
 }
