@@ -109,6 +109,13 @@ impl Ladder {
         self.traced += paths;
     }
 
+    /// How densely the next draw's paths will lie, over as many independent ones: the sum over rungs of these factors times the rung's target, in
+    /// paths that are worth an independent one. From earlier draws alone; `None` before the first.
+    pub fn densities(&self) -> Option<Vec<f64>> {
+        let known = self.normalisation.assumed.len() == self.strata();
+        known.then(|| Mixture::new(Combine::Mis, &self.shares, &self.normalisation.assumed, &self.taus(1.0)).densities().to_vec())
+    }
+
     /// The settings it was made with.
     pub fn settings(&self) -> &LadderSettings {
         &self.settings

@@ -40,17 +40,23 @@ pub enum Purpose {
     Pilot = 5,
     /// Tests and diagnostics.
     Test = 6,
+    /// Which subpaths are joined with which, for all pixels of an iteration together; the index is 0.
+    Pair = 7,
+    /// A camera subpath that finds where light is wanted and adds nothing to the image; the index is the pixel.
+    Look = 8,
 }
 
 impl Purpose {
     /// Every purpose, with the name the command line uses for it.
-    pub const ALL: [(Purpose, &'static str); 6] = [
+    pub const ALL: [(Purpose, &'static str); 8] = [
         (Purpose::Camera, "camera"),
         (Purpose::Light, "light"),
         (Purpose::Connect, "connect"),
         (Purpose::Mutate, "mutate"),
         (Purpose::Pilot, "pilot"),
         (Purpose::Test, "test"),
+        (Purpose::Pair, "pair"),
+        (Purpose::Look, "look"),
     ];
 }
 
@@ -121,7 +127,7 @@ impl UniformStream {
 
     /// A whole number below `count`, which is positive; uniform to a 2^-32nd.
     #[inline(always)]
-    pub(crate) fn below(&mut self, count: usize) -> usize {
+    pub fn below(&mut self, count: usize) -> usize {
         ((u64::from(self.bits()) * count as u64) >> 32) as usize
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! A method is prepared once and then iterated; it knows no loop, no clock and no file (`render` does).
 
+mod aimed;
 pub mod chains;
+mod eye;
 pub mod path;
 pub mod photon_settings;
 pub mod sppm;

@@ -272,6 +272,16 @@ impl PhotonSettings {
         Some(LadderPlan { rungs: self.chains.rungs.clone().unwrap_or(rungs), regions, rest })
     }
 
+    /// The sampler's ladder where one world radius serves all points: kernels are of one size, and a rung that evens them out is left out
+    /// unless asked for.
+    pub fn ladder_of_one_radius(&self) -> Option<LadderPlan> {
+        let mut plan = self.ladder()?;
+        if self.chains.rungs.is_none() && plan.regions != RegionKind::None {
+            plan.rungs.retain(|rung| *rung != Rung::Kernel);
+        }
+        Some(plan)
+    }
+
     /// Light paths an iteration over a film of this size.
     pub fn photon_count(&self, size: (usize, usize)) -> u64 {
         let pixels = (size.0 * size.1) as u64;

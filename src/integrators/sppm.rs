@@ -8,10 +8,11 @@
 //! A sampler with a target needs the points first (`aimed`).
 
 mod aimed;
-pub(super) mod eye;
 mod uniform;
 
+use super::aimed::Aimed;
 use super::chains::ChainReport;
+use super::eye::{Eye, Radius, Seen};
 use super::photon_settings::{GlossyPaths, PhotonSettings};
 use super::{Common, Integrator, IterationStats, MethodError, Settings};
 use crate::image::film::Film;
@@ -19,9 +20,7 @@ use crate::math::Rgb;
 use crate::photons::radius::shrink;
 use crate::scene::Scene;
 use crate::targets::LightPaths;
-use aimed::Aimed;
 use clap::Args;
-use eye::{Eye, Radius, Seen};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -138,7 +137,7 @@ impl Integrator for Sppm<'_> {
         match self.aimed.take() {
             Some(mut aimed) => {
                 // Without any measurement point the grid is never asked.
-                self.cell = 2.0 * aimed.prepare(self, &mut stats).unwrap_or(1.0);
+                self.cell = 2.0 * aimed.prepare(&self.eye, self.radius_at(0), &mut stats).unwrap_or(1.0);
                 self.aimed = Some(aimed);
             }
             // The grid's cells are as wide as a typical query, so that one touches about two runs a row.
@@ -158,7 +157,8 @@ impl Integrator for Sppm<'_> {
         let counts = match self.aimed.take() {
             Some(mut aimed) => {
                 let rests = aimed.rests(self.photon_count);
-                let counts = if rests { self.iterate_uniform(i, film, &mut stats) } else { aimed.iterate(self, i, film, &mut stats) };
+                let counts =
+                    if rests { self.iterate_uniform(i, film, &mut stats) } else { self.iterate_aimed(&mut aimed, i, film, &mut stats) };
                 self.aimed = Some(aimed);
                 counts
             }

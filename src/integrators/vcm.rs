@@ -3,16 +3,22 @@
 //! An iteration traces light subpaths, connects their vertices to the camera and keeps them; then it traces one camera subpath a pixel, which
 //! hits emitters, samples lights, is connected to the vertices of one light subpath, and merges with those of all that lie near. Weights are
 //! those of `transport::mis`.
+//!
+//! A sampler with a target needs to know first what the camera sees (`aimed`).
 
+mod aimed;
 mod eye;
 mod iteration;
 mod light;
+mod pairing;
 mod pyramid;
 mod settings;
 mod technique;
 
+use super::aimed::Aimed;
+use super::chains::ChainReport;
+use super::eye::Eye;
 use super::photon_settings::PhotonSettings;
-use super::sppm::eye::Eye;
 use super::{Common, Integrator, IterationStats, MethodError};
 use crate::image::film::Film;
 use crate::image::layers::Layer;
@@ -28,6 +34,7 @@ use crate::transport::subpath::{Photons, Subpaths};
 use iteration::Iteration;
 use light::{Batch, LightSide, Merging};
 use pyramid::Pyramid;
+use serde_json::{Value, json};
 
 pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
 pub use technique::{Technique, TechniqueName};
@@ -45,6 +52,8 @@ struct Engine<'a> {
     /// What earlier iterations tell of how dense photons lie; `None` for heuristics that do not ask.
     density: Option<DensityMap>,
     alone: Option<Technique>,
+    /// Chains and their targets; `None` with the uniform sampler.
+    aimed: Option<Aimed>,
 }
 
 impl<'a> Engine<'a> {
@@ -57,7 +66,24 @@ impl<'a> Engine<'a> {
         photons: PhotonSettings,
         alone: Option<Technique>,
     ) -> Self {
-        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone }
+        let ladder = if techniques.merges { photons.ladder_of_one_radius() } else { photons.ladder() };
+        let aimed = ladder.map(|ladder| Aimed::new(&photons, &ladder, common.seed));
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone, aimed }
+    }
+
+    /// Camera subpaths to their first vertex that merges, or would.
+    fn eye(&self) -> Eye<'a> {
+        Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() }
+    }
+
+    /// Do light subpaths count? A path of one edge is a light seen directly, and left to the camera's side.
+    fn shines(&self) -> bool {
+        self.common.max_depth.is_none_or(|most| most > 1)
+    }
+
+    /// Light subpaths an iteration, at most.
+    fn light_paths(&self) -> u64 {
+        self.photons.photon_count(self.size)
     }
 
     /// Roughness from which a surface merges.
@@ -72,7 +98,7 @@ impl<'a> Engine<'a> {
 
     fn sampling(&self, i: u64) -> Sampling {
         let radius = self.radius * shrink(i, self.photons.alpha);
-        let light_paths = self.photons.photon_count(self.size) as f64;
+        let light_paths = self.light_paths() as f64;
         Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
     }
 
@@ -89,6 +115,7 @@ impl<'a> Engine<'a> {
             depths: self.depths(),
             radius: sampling.radius as f32,
             merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
+            gain: None,
             alone: self.alone,
             records: false,
         }
@@ -96,8 +123,7 @@ impl<'a> Engine<'a> {
 
     /// Light subpaths of an iteration, their splats in the film.
     fn shoot(&self, iteration: &Iteration<'_, '_>, film: &mut Film, stats: &mut IterationStats) -> LightSide {
-        // A path of one edge is a light seen directly, and left to the camera's side.
-        let count = if iteration.depths.max > 1 { self.photons.photon_count(self.size) } else { 0 };
+        let count = if self.shines() { self.light_paths() } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
         let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
@@ -107,7 +133,7 @@ impl<'a> Engine<'a> {
             film.add_splats(&draw.batches, count);
             iteration.record_splats(film, draw.batches.iter().flat_map(|batch| &batch.recorded), stats);
         }
-        LightSide::new(draw)
+        LightSide::new(draw.batches, None)
     }
 }
 
@@ -118,10 +144,9 @@ impl Integrator for Engine<'_> {
             self.radius = match self.photons.radius {
                 Some(radius) => radius,
                 None => {
-                    let eye = Eye { scene: self.scene, common: self.common.clone(), size: self.size, threshold: self.threshold() };
                     // Where no pixel's centre shows a surface that merges, hardly any subpath will find one; a scene without extent has none.
                     let fallback = |extent: f32| if extent > 0.0 { 1e-3 * extent } else { 1.0 };
-                    let footprint = eye.median_footprint(&mut stats).unwrap_or_else(|| fallback(self.scene.bounding_sphere().1));
+                    let footprint = self.eye().median_footprint(&mut stats).unwrap_or_else(|| fallback(self.scene.bounding_sphere().1));
                     self.photons.radius_pixels.unwrap_or(1.0) * f64::from(footprint)
                 }
             };
@@ -129,19 +154,38 @@ impl Integrator for Engine<'_> {
         if self.heuristic.asks_density() && self.techniques.merges {
             self.density = Some(DensityMap::new(DensitySettings::for_radius(self.radius as f32)));
         }
+        if let Some(mut aimed) = self.aimed.take() {
+            aimed.prepare(&self.eye(), self.measured_radius(0).0, &mut stats);
+            self.aimed = Some(aimed);
+        }
         Ok(stats)
     }
 
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
         let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
-        let sampling = self.sampling(i);
+        let (mut density, mut aimed) = (self.density.take(), self.aimed.take());
+        let rests = aimed.as_mut().is_some_and(|aimed| !self.shines() || aimed.rests(self.light_paths()));
+        let mut chains = aimed.as_mut().filter(|_| !rests);
+        let sights = chains.as_mut().map(|aimed| self.aim(aimed, i, &mut stats));
+        let gain = chains.as_ref().zip(sights.as_ref()).and_then(|(aimed, sights)| aimed.gain(sights));
+        let mut sampling = self.sampling(i);
+        if gain.is_some() && self.techniques.merges {
+            sampling.heuristic = sampling.heuristic.by_photons();
+        }
         let weights = Weights::new(&sampling);
-        let mut density = self.density.take();
         let area = sampling.merge_area() as f32;
         let photons = density.as_ref().map(|map| move |end: &Endpoint| map.photons(end.p, area));
-        let photons = photons.as_ref().map(|photons| photons as Photons<'_>);
-        let iteration = Iteration { records: film.layers().is_some(), ..self.iteration(i, &sampling, &weights, photons) };
-        let light = self.shoot(&iteration, film, &mut stats);
+        let fewer = gain.map(|gain| move |end: &Endpoint| gain.at(end).recip());
+        let photons = match (&photons, &fewer) {
+            (Some(photons), _) => Some(photons as Photons<'_>),
+            (None, Some(fewer)) => Some(fewer as Photons<'_>),
+            (None, None) => None,
+        };
+        let iteration = Iteration { gain, records: film.layers().is_some(), ..self.iteration(i, &sampling, &weights, photons) };
+        let (light, sums) = match (&mut chains, &sights) {
+            (Some(aimed), Some(sights)) => self.shoot_aimed((aimed, sights), &iteration, film, &mut stats),
+            _ => (self.shoot(&iteration, film, &mut stats), None),
+        };
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
         iteration.camera_side(film, &light, merging.as_ref(), &mut stats);
         // Only now, when every weight of the iteration is known.
@@ -149,12 +193,15 @@ impl Integrator for Engine<'_> {
             let grid = merging.store.grid();
             map.insert(grid.len(), |place| grid.position(place));
         }
-        self.density = density;
+        if let (Some(aimed), Some(sights)) = (chains, sights) {
+            aimed.learn(sights, sums.as_deref());
+        }
+        (self.density, self.aimed) = (density, aimed);
         stats
     }
 
     fn stateless(&self) -> bool {
-        !(self.techniques.merges && self.heuristic.asks_density())
+        self.aimed.is_none() && !(self.techniques.merges && self.heuristic.asks_density())
     }
 
     fn radius(&self) -> Option<f64> {
@@ -164,6 +211,14 @@ impl Integrator for Engine<'_> {
     fn technique_layers(&self) -> Result<Vec<Layer>, MethodError> {
         let pyramid = Pyramid::new(self.techniques, self.depths()).ok_or(MethodError::PyramidDepth { most: pyramid::LONGEST })?;
         Ok(pyramid.layers())
+    }
+
+    fn diagnostics(&self) -> Option<Value> {
+        self.aimed.as_ref().map(|aimed| json!({ "sampler": aimed.report().to_json() }))
+    }
+
+    fn chains(&self) -> Option<ChainReport> {
+        self.aimed.as_ref().map(Aimed::report)
     }
 }
 

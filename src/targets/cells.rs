@@ -9,9 +9,10 @@
 //! lies in the cell of its centre; a cell makes those of its neighbours positive that its points' disks may reach into. `seen` gathers points and
 //! makes the targets; this module finds what a path's vertices are worth.
 
-use super::light_paths::LightVertex;
+use super::light_paths::Arrival;
 use super::points::{DepthRange, MeasurementPoint, kernel_size};
 use crate::math::fetch;
+use crate::scene::hit::Endpoint;
 use glam::{IVec3, Vec3};
 use table::{Key, Probe, SHARDS, Sharded};
 
@@ -169,16 +170,35 @@ impl Cells {
         Key { cell: widest, level: 0 }.hash() & (self.present.len() as u32 - 1)
     }
 
+    /// Kernel and full target at a place of a surface, whichever of its sides light comes from; `None` outside.
+    #[inline]
+    pub fn worth(&self, end: &Endpoint) -> Option<[f32; 2]> {
+        let bucket = self.bucket(Key::of(end.p, *self.inverse_sides.first()?, 0).cell);
+        let mut levels = self.present[bucket as usize];
+        let faces = face(end.n_g) | face(-end.n_g);
+        let mut found: Option<[f32; 2]> = None;
+        while levels != 0 {
+            let level = levels.trailing_zeros() as usize;
+            levels &= levels - 1;
+            let probe = self.worths.probe(Key::of(end.p, self.inverse_sides[level], level as i32));
+            if let Some((_, worth)) = self.worths.at(&probe).filter(|(_, worth)| worth.gate.faces & faces != 0) {
+                let [kernel, full] = found.unwrap_or_default();
+                found = Some([kernel.max(worth.kernel), full.max(worth.full)]);
+            }
+        }
+        found
+    }
+
     /// What a path's vertices are worth: the largest target of the cells that they lie in [STF (11), (12)].
     #[inline]
-    pub fn reached(&self, vertices: &[LightVertex], search: &mut CellSearch) -> Reached {
+    pub fn reached<V: Arrival>(&self, vertices: &[V], search: &mut CellSearch) -> Reached {
         let mut reached = Reached::default();
         let Some(inverse) = self.inverse_sides.first() else { return reached };
         let CellSearch { buckets, probes } = search;
         // Step by step for all vertices together: each look-up waits for memory twice.
         buckets.clear();
         for vertex in vertices {
-            let bucket = self.bucket(Key::of(vertex.end.p, *inverse, 0).cell);
+            let bucket = self.bucket(Key::of(vertex.end().p, *inverse, 0).cell);
             fetch(&self.present[bucket as usize]);
             buckets.push(bucket);
         }
@@ -188,7 +208,7 @@ impl Cells {
             while levels != 0 {
                 let level = levels.trailing_zeros() as usize;
                 levels &= levels - 1;
-                let probe = self.worths.probe(Key::of(vertices[i as usize].end.p, self.inverse_sides[level], level as i32));
+                let probe = self.worths.probe(Key::of(vertices[i as usize].end().p, self.inverse_sides[level], level as i32));
                 probes.push((i, probe));
             }
         }
@@ -196,9 +216,9 @@ impl Cells {
         for (i, probe) in &*probes {
             let Some((cell, worth)) = self.worths.at(probe) else { continue };
             let vertex = &vertices[*i as usize];
-            let n = vertex.end.n_g;
-            let towards = if vertex.wi.dot(n) < 0.0 { -n } else { n };
-            if worth.gate.admits(face(towards), vertex.depth, self.depths) {
+            let n = vertex.end().n_g;
+            let towards = if vertex.wi().dot(n) < 0.0 { -n } else { n };
+            if worth.gate.admits(face(towards), vertex.depth(), self.depths) {
                 if last == u32::MAX {
                     reached.cell = cell;
                 }

@@ -1,19 +1,40 @@
 //! What light paths leave at measurement points and in regions, summed in one order whatever the number of threads.
 
-use super::aimed::AimedPath;
+use super::light_paths::Arrivals;
 use super::points::{Points, Search, Touch};
 use super::regions::Half;
+use super::shares::Shares;
 use crate::math::Rgb;
-use crate::samplers::{Draw, Drawn};
+use crate::samplers::Drawn;
 use crate::transport::walk::Tally;
 use rayon::prelude::*;
 
-/// Flux that a path left at a point.
+/// What is summed at a point beside counts: flux, or nothing.
+pub trait Left: Copy + Send + Sync {
+    /// As three numbers.
+    fn values(self) -> [f32; 3];
+}
+
+impl Left for Rgb {
+    #[inline(always)]
+    fn values(self) -> [f32; 3] {
+        self.to_array()
+    }
+}
+
+impl Left for () {
+    #[inline(always)]
+    fn values(self) -> [f32; 3] {
+        [0.0; 3]
+    }
+}
+
+/// What a path left at a point.
 #[derive(Clone, Copy, Debug)]
-struct Deposit {
+struct Deposit<V> {
     point: u32,
     path: PathNumber,
-    value: Rgb,
+    value: V,
 }
 
 /// Number of a path within its ensemble, and whether this is its first deposit at the point and in the point's region.
@@ -33,27 +54,16 @@ impl PathNumber {
     }
 }
 
-/// What a path counts for in one stratum.
-#[derive(Clone, Copy, Debug)]
-struct Share {
-    path: u32,
-    stratum: u32,
-    weight: f64,
-    pilot_weight: f64,
-}
-
 /// Points of consecutive numbers share a list, so that lists are summed side by side.
 const LISTS: usize = 32;
 
 /// What one ensemble leaves.
 #[derive(Debug)]
-pub struct Deposits {
-    lists: Vec<Vec<Deposit>>,
+pub struct Deposits<V> {
+    lists: Vec<Vec<Deposit<V>>>,
     points_a_list: u32,
-    /// Paths that left something.
-    paths: u32,
-    /// Their strata, path by path.
-    shares: Vec<Share>,
+    /// Strata of the paths that left something.
+    shares: Shares,
     /// Regions are asked for.
     regions: bool,
     /// Pairs of the path at hand.
@@ -75,14 +85,13 @@ pub struct Collected {
     pub paths: [f64; 2],
 }
 
-impl Deposits {
+impl<V: Left> Deposits<V> {
     /// Nothing yet. `regions` is whether statistics for them are kept.
     pub fn new(points: usize, regions: bool) -> Self {
         Self {
             lists: vec![Vec::new(); LISTS],
             points_a_list: points.div_ceil(LISTS).max(1) as u32,
-            paths: 0,
-            shares: Vec::new(),
+            shares: Shares::default(),
             regions,
             touches: Vec::new(),
             search: Search::default(),
@@ -90,40 +99,26 @@ impl Deposits {
         }
     }
 
-    /// Takes a path as the sampler hands it out: at most 2^30 that leave something.
-    pub fn add(&mut self, points: &Points<'_>, path: &AimedPath, drawn: &[Drawn]) {
-        points.touched(&path.light.vertices, &mut self.search, &mut self.touches);
+    /// Takes a path as the sampler hands it out: at most 2^30 that leave something. `value` is what a vertex leaves at a point that takes it.
+    pub fn add<P: Arrivals>(&mut self, points: &Points<'_>, path: &P, drawn: &[Drawn], value: impl Fn(&mut Tally, u32, &P::Vertex) -> V) {
+        points.touched(path.vertices(), &mut self.search, &mut self.touches);
         if self.touches.is_empty() {
             return;
         }
         self.touches.iter().for_each(|touch| points.fetch(touch.point));
-        let share = |d: &Drawn| Share { path: self.paths, stratum: d.stratum as u32, weight: d.weight, pilot_weight: d.pilot_weight };
-        self.shares.extend(drawn.iter().map(share));
+        let number = self.shares.paths();
+        self.shares.add(drawn);
         for (i, touch) in self.touches.iter().enumerate() {
-            let value = points.value(touch.point, &path.light.vertices[touch.vertex as usize]);
-            let value = self.tally.finite(value);
+            let value = value(&mut self.tally, touch.point, &path.vertices()[touch.vertex as usize]);
             let flags = if self.regions { firsts(points, &self.touches[..i], touch.point) } else { 0 };
             let list = &mut self.lists[(touch.point / self.points_a_list) as usize];
-            list.push(Deposit { point: touch.point, path: PathNumber(self.paths | flags), value });
+            list.push(Deposit { point: touch.point, path: PathNumber(number | flags), value });
         }
-        self.paths += 1;
     }
 
     /// Pairs of a light vertex and a measurement point that took it.
     pub fn count(&self) -> u64 {
         self.lists.iter().map(|list| list.len() as u64).sum()
-    }
-
-    /// Of every path: its factors on flux and on `psi`, strata scaled.
-    fn factors(&self, scales: &[f64]) -> Vec<[f64; 2]> {
-        let mut factors = vec![[0.0; 2]; self.paths as usize];
-        for share in &self.shares {
-            let scale = scales[share.stratum as usize];
-            let [flux, psi] = &mut factors[share.path as usize];
-            *flux += scale * share.weight;
-            *psi += scale * share.pilot_weight;
-        }
-        factors
     }
 }
 
@@ -142,21 +137,21 @@ fn firsts(points: &Points<'_>, before: &[Touch], point: u32) -> u32 {
     at_point | in_region
 }
 
-/// Sums at every point.
-pub fn collect(draw: &Draw<Deposits>, points: usize) -> Vec<Collected> {
-    let factors: Vec<Vec<[f64; 2]>> = draw.batches.par_iter().map(|batch| batch.factors(&draw.scales)).collect();
+/// Sums at every point of what a draw's batches left, by its scales.
+pub fn collect<V: Left>(batches: &[Deposits<V>], scales: &[f64], points: usize) -> Vec<Collected> {
+    let factors: Vec<Vec<[f64; 2]>> = batches.par_iter().map(|batch| batch.shares.factors(scales)).collect();
     // Scales are for all ensembles together.
-    let count = draw.batches.len();
+    let count = batches.len();
     let halves = [count.div_ceil(2), count / 2].map(|members| count as f64 / members.max(1) as f64);
     let mut sums = vec![Collected::default(); points];
     let each = points.div_ceil(LISTS).max(1);
     sums.par_chunks_mut(each).enumerate().with_max_len(1).for_each(|(list, sums)| {
-        for (number, (batch, factors)) in draw.batches.iter().zip(&factors).enumerate() {
+        for (number, (batch, factors)) in batches.iter().zip(&factors).enumerate() {
             let half = number % 2;
             for deposit in &batch.lists[list] {
                 let [flux, psi] = factors[deposit.path.index()];
                 let sum = &mut sums[deposit.point as usize - list * each];
-                deposit.value.to_array().into_iter().zip(&mut sum.flux).for_each(|(value, sum)| *sum += flux * f64::from(value));
+                deposit.value.values().into_iter().zip(&mut sum.flux).for_each(|(value, sum)| *sum += flux * f64::from(value));
                 // A path of the last rung alone has no part in statistics.
                 if psi > 0.0 {
                     sum.psi[half] += if deposit.path.is(PathNumber::FIRST_AT_POINT) { halves[half] * psi } else { 0.0 };

@@ -8,6 +8,26 @@ use crate::scene::hit::Endpoint;
 use crate::transport::walk::{Roulette, Start, Step, Tally, walk};
 use glam::{Vec2, Vec3};
 
+/// Light that arrives at a surface: what targets ask of a vertex of a light subpath, whoever traced it.
+pub trait Arrival {
+    /// Position and geometric normal.
+    fn end(&self) -> &Endpoint;
+    /// Unit direction towards where the light came from.
+    fn wi(&self) -> Vec3;
+    /// Edges from the light.
+    fn depth(&self) -> u32;
+}
+
+/// A traced light subpath that targets look at.
+pub trait Arrivals {
+    /// What its vertices are.
+    type Vertex: Arrival;
+    /// Those that may count, in the order of travel.
+    fn vertices(&self) -> &[Self::Vertex];
+    /// What tracing it cost.
+    fn tally(&self) -> &Tally;
+}
+
 /// A vertex of a light subpath where density can be estimated: its material has a lobe rougher than the threshold.
 #[derive(Clone, Copy, Debug)]
 pub struct LightVertex {
@@ -21,6 +41,21 @@ pub struct LightVertex {
     pub depth: u32,
 }
 
+impl Arrival for LightVertex {
+    #[inline(always)]
+    fn end(&self) -> &Endpoint {
+        &self.end
+    }
+    #[inline(always)]
+    fn wi(&self) -> Vec3 {
+        self.wi
+    }
+    #[inline(always)]
+    fn depth(&self) -> u32 {
+        self.depth
+    }
+}
+
 /// A traced light subpath; a buffer that is filled again and again.
 #[derive(Clone, Debug, Default)]
 pub struct LightPath {
@@ -28,6 +63,18 @@ pub struct LightPath {
     pub vertices: Vec<LightVertex>,
     /// What tracing it cost.
     pub tally: Tally,
+}
+
+impl Arrivals for LightPath {
+    type Vertex = LightVertex;
+    #[inline(always)]
+    fn vertices(&self) -> &[LightVertex] {
+        &self.vertices
+    }
+    #[inline(always)]
+    fn tally(&self) -> &Tally {
+        &self.tally
+    }
 }
 
 /// All light subpaths of a scene.

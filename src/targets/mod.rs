@@ -7,6 +7,7 @@ pub mod deposits;
 pub mod light_paths;
 pub mod points;
 pub mod regions;
+pub mod shares;
 pub mod tallies;
 
-pub use light_paths::{LightPath, LightPaths, LightVertex};
+pub use light_paths::{Arrival, Arrivals, LightPath, LightPaths, LightVertex};

@@ -1,7 +1,7 @@
 //! Measurement points of an iteration, found by the light vertices that fall into them.
 
 use super::aim::Aim;
-use super::light_paths::LightVertex;
+use super::light_paths::{Arrival, LightVertex};
 use crate::math::Rgb;
 use crate::math::fetch;
 use crate::transport::merge::{accepts, merge};
@@ -131,16 +131,16 @@ impl<'a> Points<'a> {
     /// Pairs of a path's vertices and the points that take them, each once, in an order that depends on path and points alone; what
     /// `touches` held is replaced. The rule is that of the flux.
     #[inline]
-    pub fn touched(&self, vertices: &[LightVertex], search: &mut Search, touches: &mut Vec<Touch>) {
+    pub fn touched<V: Arrival>(&self, vertices: &[V], search: &mut Search, touches: &mut Vec<Touch>) {
         touches.clear();
-        self.grid.containing(vertices.iter().map(|v| v.end.p), &mut search.lookups, |vertex, point| {
+        self.grid.containing(vertices.iter().map(|v| v.end().p), &mut search.lookups, |vertex, point| {
             fetch(&self.disks[point as usize]);
             touches.push(Touch { vertex, point });
         });
         touches.retain(|touch| {
             let (disk, vertex) = (&self.disks[touch.point as usize], &vertices[touch.vertex as usize]);
-            let depth = disk.depth + vertex.depth;
-            depth >= self.depths.min && depth <= self.depths.max && accepts(disk.n_g, disk.n_s, vertex.end.n_g, vertex.wi)
+            let depth = disk.depth + vertex.depth();
+            depth >= self.depths.min && depth <= self.depths.max && accepts(disk.n_g, disk.n_s, vertex.end().n_g, vertex.wi())
         });
     }
 

@@ -52,6 +52,27 @@ fn threads_change_no_bit() {
     }
 }
 
+/// Chains that draw for connections and merges.
+#[test]
+fn threads_change_no_bit_of_bidirectional_chains() {
+    let bench = Bench::new();
+    for (method, sampler) in [("vcm", "visibility"), ("vcm", "spatial"), ("bdpt", "visibility"), ("bdpt", "spatial")] {
+        let on = |threads: &str| {
+            let fixed = ["render", method, SCENE, "-o", "a.exr", "--sampler", sampler, "--photons", "5000", "--rest", "never", "-q"];
+            bench.succeed(&[&fixed[..], &["--threads", threads]].concat());
+            essence(&bench.read("a.exr"))
+        };
+        let one = on("1");
+        assert_eq!(one.1["diagnostics"]["sampler"]["draws"], 3, "{method} {sampler}");
+        for threads in ["2", "3"] {
+            assert!(on(threads) == one, "{method} {sampler} at {threads} threads");
+        }
+        // Every number of what stands there makes the method again.
+        assert_eq!(one.1["settings"]["sampler"], sampler);
+        assert_eq!(one.1["settings"]["rest"], "never");
+    }
+}
+
 #[test]
 fn seeds_and_ranges_are_other_images() {
     let bench = Bench::new();

@@ -27,6 +27,11 @@ impl Mixture {
         Self { combine, shares: shares.to_vec(), densities }
     }
 
+    /// Factors of the targets in the density of all rungs together, in paths that are worth an independent one, over that of as many independent paths.
+    pub(crate) fn densities(&self) -> &[f64] {
+        &self.densities
+    }
+
     /// Weight and pilot weight, `w/T`, of one state of `rung` with these targets.
     #[inline]
     pub(crate) fn of(&self, rung: usize, values: &[f64]) -> (f64, f64) {

@@ -5,7 +5,7 @@ use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
 use crate::photons::{Photon, Store};
-use crate::samplers::{Drawn, PhotonSampler, Uniform};
+use crate::samplers::{Drawn, PhotonSampler, Purpose, Uniform};
 use crate::targets::LightPath;
 use crate::targets::points::MeasurementPoint;
 use crate::transport::merge::{accepts, merge};
@@ -19,7 +19,7 @@ impl Sppm<'_> {
         let radius = self.radius_at(i);
         let width = self.eye.size.0;
         let sample = |(tally, counts): &mut (Tally, Counts), x: usize, y: usize| {
-            let seen = self.eye.sample(i, y * width + x, radius, tally);
+            let seen = self.eye.sample((i, Purpose::Camera), y * width + x, radius, tally);
             counts.glossy.see(&seen);
             let gathered = seen.measured.as_ref().map_or(Rgb::BLACK, |m| self.gather(m, &photons, &scales, &mut counts.deposits));
             tally.finite(self.emission(&seen) + gathered)

@@ -51,8 +51,9 @@ impl<'a> Iteration<'a, '_> {
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
-                    for (partner, letters) in light.partner(number) {
-                        let found = self.connect(vertex, &point, (partner, letters), tally, record);
+                    let (factor, partners) = light.partner(number);
+                    for (partner, letters) in partners {
+                        let found = self.connect(vertex, &point, (partner, letters, factor), tally, record);
                         sum += tally.finite(found);
                     }
                 }
@@ -72,7 +73,7 @@ impl<'a> Iteration<'a, '_> {
     /// What the first vertex of a camera subpath carries.
     pub(super) fn seen(&self, seen: &CameraRay, hit: &Hit, share: f32) -> Carried<f32> {
         let edge = Edge::between(1.0, seen.ray.d.dot(hit.end.n_g).abs(), seen.end.p.distance_squared(hit.end.p));
-        self.subpaths.weights.from_camera(seen.pdf_pixel.0, edge, share)
+        self.subpaths.weights.from_camera(self.pixel_density(seen.pdf_pixel.0, &hit.end), edge, share)
     }
 
     /// Does emission count that is met after so many edges?
@@ -165,7 +166,7 @@ impl<'a> Iteration<'a, '_> {
         &self,
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
-        (partner, letters): (&LightVertex, Letters),
+        (partner, letters, factor): (&LightVertex, Letters, f32),
         tally: &mut Tally,
         record: &mut R,
     ) -> Rgb {
@@ -179,7 +180,8 @@ impl<'a> Iteration<'a, '_> {
         let cosines = point.cosine(Mode::Radiance, w) * other.cosine(Mode::Importance, -w);
         let ways = [(&other, Mode::Importance, -w), (point, Mode::Radiance, w)];
         let class = self.common.paths.as_ref().map(|pattern| self.two_events(pattern, letters, ways, vertex.letters));
-        let with = |weight: f32| in_class(vertex.throughput * here.f * there.f * partner.flux * (weight * cosines / distance2), class);
+        let with =
+            |weight: f32| in_class(vertex.throughput * here.f * there.f * partner.flux * (weight * factor * cosines / distance2), class);
         let technique = Technique::Connection(partner.carried.edges + 1);
         let value = with(self.weigh(technique, weight));
         let all = if R::ON { with(1.0) } else { value };

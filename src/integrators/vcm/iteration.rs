@@ -4,6 +4,8 @@ use super::super::Common;
 use super::technique::Technique;
 use crate::math::Rgb;
 use crate::scene::bsdf::Mode;
+use crate::scene::hit::Endpoint;
+use crate::targets::aimed::Gain;
 use crate::targets::points::DepthRange;
 use crate::transport::class::Letters;
 use crate::transport::mis::Techniques;
@@ -28,6 +30,8 @@ pub(super) struct Iteration<'a, 'w> {
     pub(super) radius: f32,
     /// One over their area and the number of light subpaths.
     pub(super) merge_density: f32,
+    /// How much denser light subpaths lie than independent ones, by place; `None` where they are independent.
+    pub(super) gain: Option<Gain<'w>>,
     /// The one technique that counts, with weight 1; `None` for all of the set with their weights.
     pub(super) alone: Option<Technique>,
     /// Are images of single techniques kept?
@@ -45,6 +49,12 @@ impl Iteration<'_, '_> {
     /// Are light vertices asked for after their path is traced?
     pub(super) fn keeps_vertices(&self) -> bool {
         self.techniques.connections || self.techniques.merges
+    }
+
+    /// Density of camera rays through a pixel as weights take it: splats are as many as light subpaths lie at the surface.
+    #[inline(always)]
+    pub(super) fn pixel_density(&self, pixel: f32, end: &Endpoint) -> f32 {
+        self.gain.map_or(pixel, |gain| pixel / gain.at(end))
     }
 
     /// The weight that counts.

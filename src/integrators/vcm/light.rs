@@ -2,16 +2,19 @@
 
 use super::eye::in_class;
 use super::iteration::Iteration;
+use super::pairing::Pairing;
 use super::pyramid::RecordedSplat;
 use super::technique::Technique;
 use crate::image::film::Splat;
 use crate::math::{Frame, Rgb};
 use crate::photons::Store;
-use crate::samplers::{Draw, Drawn, Key, LightPathSpace, Purpose, Stream};
+use crate::samplers::{Drawn, Key, LightPathSpace, Purpose, Stream};
 use crate::scene::ShapeId;
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraConnection;
 use crate::scene::hit::Endpoint;
+use crate::targets::shares::Shares;
+use crate::targets::{Arrival, Arrivals};
 use crate::transport::class::Letters;
 use crate::transport::mis::{Carried, Connector, LightEnd};
 use crate::transport::shading::SurfacePoint;
@@ -53,6 +56,21 @@ impl LightVertex {
     }
 }
 
+impl Arrival for LightVertex {
+    #[inline(always)]
+    fn end(&self) -> &Endpoint {
+        &self.end
+    }
+    #[inline(always)]
+    fn wi(&self) -> Vec3 {
+        self.wi
+    }
+    #[inline(always)]
+    fn depth(&self) -> u32 {
+        self.carried.edges
+    }
+}
+
 /// A traced light subpath; a buffer that is filled again and again.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LightSubpath {
@@ -60,6 +78,18 @@ pub(super) struct LightSubpath {
     /// Events before each vertex; empty unless classes are kept.
     letters: Vec<Letters>,
     tally: Tally,
+}
+
+impl Arrivals for LightSubpath {
+    type Vertex = LightVertex;
+    #[inline(always)]
+    fn vertices(&self) -> &[LightVertex] {
+        &self.vertices
+    }
+    #[inline(always)]
+    fn tally(&self) -> &Tally {
+        &self.tally
+    }
 }
 
 impl LightPathSpace for Iteration<'_, '_> {
@@ -113,7 +143,31 @@ pub(super) struct Batch {
     splats: Vec<Splat>,
     /// The same by length, with weights and without; empty unless images of techniques are kept.
     pub(super) recorded: Vec<RecordedSplat>,
+    /// What paths count for, and where each one's splats end: nothing of independent paths, which all count the same.
+    shares: Shares,
+    splat_ends: Vec<u32>,
     pub(super) tally: Tally,
+}
+
+impl Batch {
+    /// Makes every path count for what a sampler with targets says, relative to one of `count` independent paths: splats and the flux of
+    /// vertices are multiplied by it. Returns these factors.
+    pub(super) fn weigh(&mut self, scales: &[f64], count: u64) -> Vec<f32> {
+        let weights: Vec<f32> = self.shares.factors(scales).iter().map(|[weight, _]| (weight * count as f64) as f32).collect();
+        let (mut vertex, mut splat) = (0, 0);
+        for (weight, (end, splat_end)) in weights.iter().zip(self.ends.iter().zip(&self.splat_ends)) {
+            let (end, splat_end) = (*end as usize, *splat_end as usize);
+            self.vertices[vertex..end].iter_mut().for_each(|vertex| vertex.flux *= *weight);
+            self.splats[splat..splat_end].iter_mut().for_each(|splat| splat.value *= *weight);
+            // As many as splats, or none.
+            for recorded in self.recorded.iter_mut().take(splat_end).skip(splat) {
+                recorded.weighted *= *weight;
+                recorded.unweighted *= *weight;
+            }
+            (vertex, splat) = (end, splat_end);
+        }
+        weights
+    }
 }
 
 impl AsRef<[Splat]> for Batch {
@@ -129,11 +183,12 @@ pub(super) struct LightSide {
     /// Number of the first path of each batch.
     firsts: Vec<usize>,
     paths: usize,
+    /// Which path a pixel is connected to; by its number where paths are independent.
+    pairing: Option<Pairing>,
 }
 
 impl LightSide {
-    pub(super) fn new(draw: Draw<Batch>) -> Self {
-        let mut batches = draw.batches;
+    pub(super) fn new(mut batches: Vec<Batch>, pairing: Option<Pairing>) -> Self {
         let (mut firsts, mut paths) = (Vec::with_capacity(batches.len()), 0);
         for batch in &mut batches {
             // What is in the film is done with.
@@ -142,21 +197,27 @@ impl LightSide {
             firsts.push(paths);
             paths += batch.ends.len();
         }
-        Self { batches, firsts, paths }
+        Self { batches, firsts, paths, pairing }
     }
 
-    /// The vertices that camera subpath number `pixel` is connected to, each with the events before it.
-    pub(super) fn partner(&self, pixel: usize) -> impl Iterator<Item = (&LightVertex, Letters)> {
-        let path = pixel % self.paths.max(1);
+    /// The vertices that camera subpath number `pixel` is connected to, each with the events before it, and the factor on what they bring: one
+    /// over the number of light subpaths and the probability of this one.
+    pub(super) fn partner(&self, pixel: usize) -> (f32, impl Iterator<Item = (&LightVertex, Letters)>) {
+        let partner = match &self.pairing {
+            None => Some((pixel % self.paths.max(1), 1.0)),
+            Some(pairing) => pairing.partner(pixel),
+        };
+        let (path, factor) = partner.unwrap_or_default();
         let number = self.firsts.partition_point(|&first| first <= path).saturating_sub(1);
-        let found = self.batches.get(number).map(|batch| {
+        let found = self.batches.get(number).filter(|_| partner.is_some()).map(|batch| {
             let place = path - self.firsts[number];
             let start = place.checked_sub(1).map_or(0, |before| batch.ends[before] as usize);
             (batch, start..batch.ends[place] as usize)
         });
-        found
+        let vertices = found
             .into_iter()
-            .flat_map(|(batch, range)| range.map(move |i| (&batch.vertices[i], batch.letters.get(i).copied().unwrap_or_default())))
+            .flat_map(|(batch, range)| range.map(move |i| (&batch.vertices[i], batch.letters.get(i).copied().unwrap_or_default())));
+        (factor, vertices)
     }
 }
 
@@ -227,9 +288,24 @@ impl Merging {
 }
 
 impl Iteration<'_, '_> {
-    /// Keeps a light subpath, and what it brings to the camera.
+    /// Keeps an independent light subpath, and what it brings to the camera.
     pub(super) fn keep(&self, batch: &mut Batch, path: &LightSubpath, drawn: &[Drawn]) {
         batch.tally.add(&path.tally);
+        self.connect_and_keep(batch, path, drawn);
+    }
+
+    /// The same for a subpath whose weight comes from its sampler, and whose tracing is counted elsewhere; one without vertices leaves nothing.
+    pub(super) fn keep_weighted(&self, batch: &mut Batch, path: &LightSubpath, drawn: &[Drawn]) {
+        if path.vertices.is_empty() {
+            return;
+        }
+        self.connect_and_keep(batch, path, drawn);
+        batch.shares.add(drawn);
+        batch.splat_ends.push(batch.splats.len() as u32);
+    }
+
+    #[inline(always)]
+    fn connect_and_keep(&self, batch: &mut Batch, path: &LightSubpath, drawn: &[Drawn]) {
         let index = drawn.first().map_or(0, |drawn| drawn.index);
         if self.techniques.light_tracing {
             let key = Key { seed: self.common.seed, iteration: self.index, index: self.pixels() + index, purpose: Purpose::Connect };
@@ -281,7 +357,8 @@ impl Iteration<'_, '_> {
 
     /// Weight of a light vertex connected to the camera.
     pub(super) fn splat_weight(&self, vertex: &LightVertex, connection: &CameraConnection, met: &Met) -> f32 {
-        let found = connection.pdf_pixel.0 * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
+        let found =
+            self.pixel_density(connection.pdf_pixel.0, &vertex.end) * connection.wo.dot(vertex.end.n_g).abs() / connection.distance2;
         self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found })
     }
 

@@ -196,6 +196,7 @@ impl Iteration<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::integrators::photon_settings::{PhotonSettings, SamplerName};
     use crate::integrators::vcm::{BdptSettings, MergeWeightsName, VcmSettings};
     use crate::integrators::{BoxedSettings, Common, MethodError};
     use crate::scene::Scene;
@@ -248,11 +249,16 @@ mod tests {
     #[test]
     fn images_with_weights_add_up_to_the_image() {
         let classes = Common { paths: Some(crate::transport::class::pattern("L.*D.*E").expect("a pattern")), min_depth: 2, ..COMMON };
+        let photons = PhotonSettings { sampler: SamplerName::Visibility, photons: Some(2000), ..PhotonSettings::default() };
+        let chains = VcmSettings { photons, ..VcmSettings::default() };
         let (vcm, bdpt) = (star(None), BdptSettings::default());
-        let settings: [&dyn BoxedSettings; 2] = [&vcm, &bdpt];
-        for (name, settings, common) in
-            [("glass-room", settings[0], &COMMON), ("glass-room", settings[1], &COMMON), ("spheres", settings[0], &classes)]
-        {
+        let settings: [&dyn BoxedSettings; 3] = [&vcm, &bdpt, &chains];
+        for (name, settings, common) in [
+            ("glass-room", settings[0], &COMMON),
+            ("glass-room", settings[1], &COMMON),
+            ("glass-room", settings[2], &COMMON),
+            ("spheres", settings[0], &classes),
+        ] {
             let scene = scene(name);
             let film = film(&scene, settings, common, true);
             let mut sum = vec![Rgb::BLACK; SIZE.0 * SIZE.1];

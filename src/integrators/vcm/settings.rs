@@ -1,6 +1,6 @@
 //! What `vcm` and `bdpt` are told.
 
-use super::super::photon_settings::{GlossyPaths, PhotonSettings, SamplerName};
+use super::super::photon_settings::{ChainSettings, CombineName, GlossyPaths, PhotonSettings, SamplerName};
 use super::super::{Common, Integrator, MethodError, Settings};
 use super::Engine;
 use super::technique::{Technique, TechniqueName};
@@ -81,7 +81,15 @@ impl VcmSettings {
 
     fn check(&self) -> Result<(), String> {
         self.photons.validate()?;
-        uniform(self.photons.sampler)?;
+        whole_mixture(&self.photons)?;
+        let asks_map = matches!(self.merge_weights, MergeWeightsName::VcmPlus | MergeWeightsName::VcmStar);
+        if asks_map && self.photons.sampler != SamplerName::Uniform {
+            return Err(
+                "--merge-weights vcm-plus and vcm-star count independent photons: give --sampler uniform, or --merge-weights balance \
+                        or power"
+                    .into(),
+            );
+        }
         if self.photons.glossy_paths != GlossyPaths::Keep {
             return Err("--glossy-paths drop is for sppm: here every path is counted by some technique".into());
         }
@@ -89,12 +97,18 @@ impl VcmSettings {
     }
 }
 
-/// The samplers that draw light paths for connections so far.
-fn uniform(sampler: SamplerName) -> Result<(), String> {
-    if sampler == SamplerName::Uniform {
-        return Ok(());
+/// Connections, and merges at later camera vertices, need light paths that no target likes: independent ones alone draw them, and weights
+/// that are not the mixture's count them wrong.
+fn whole_mixture(photons: &PhotonSettings) -> Result<(), String> {
+    match photons.chains.combine {
+        Some(CombineName::Average) => {
+            Err("--combine average leaves out light paths that no target likes, which are needed here: give mis".into())
+        }
+        Some(CombineName::Last) => {
+            Err("--combine last leaves out light paths that no target likes, which are needed here: give mis".into())
+        }
+        Some(CombineName::Mis) | None => Ok(()),
     }
-    Err("only --sampler uniform draws light paths for connections as yet".into())
 }
 
 impl Settings for VcmSettings {
@@ -122,12 +136,17 @@ pub struct BdptSettings {
     #[arg(long, hide = true)]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alone: Option<Technique>,
+    /// Options of Metropolis samplers.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub chains: ChainSettings,
 }
 
 impl Settings for BdptSettings {
     fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
-        let photons = PhotonSettings { sampler: self.sampler, photons: self.photons, ..PhotonSettings::default() };
-        let checked = photons.validate().and_then(|()| uniform(self.sampler));
+        let (sampler, chains) = (self.sampler, self.chains.clone());
+        let photons = PhotonSettings { sampler, photons: self.photons, chains, ..PhotonSettings::default() };
+        let checked = photons.validate().and_then(|()| whole_mixture(&photons));
         checked.map_err(|message| MethodError::Settings { method: "bdpt", message })?;
         Ok(Box::new(Engine::new(scene, size, common, Techniques::BDPT, Heuristic::default(), photons, self.alone)))
     }

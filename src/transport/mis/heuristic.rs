@@ -73,6 +73,14 @@ impl Heuristic {
         Ok(Self { merges, beta })
     }
 
+    /// The same where every vertex says for how many samples its merges count: balance and power relative to the number of light paths.
+    pub fn by_photons(self) -> Self {
+        match self.merges {
+            MergeWeights::Balance | MergeWeights::Power => Self { merges: MergeWeights::VcmPlus, ..self },
+            MergeWeights::VcmPlus | MergeWeights::VcmStar => self,
+        }
+    }
+
     /// What merges count for.
     pub fn merges(&self) -> MergeWeights {
         self.merges

@@ -1,6 +1,6 @@
-//! The camera's side: emission seen directly or through smooth chains, and the point where a pixel measures.
+//! The camera's side of measurement points: emission seen directly or through smooth chains, and the point where a pixel measures.
 
-use super::super::{Common, IterationStats};
+use super::{Common, IterationStats};
 use crate::math::Rgb;
 use crate::samplers::{Key, Purpose, Stream, UniformStream};
 use crate::scene::Scene;
@@ -43,13 +43,13 @@ pub(super) struct Seen<'a> {
 
 /// Camera subpaths of a scene.
 #[derive(Clone)]
-pub(in crate::integrators) struct Eye<'a> {
-    pub(in crate::integrators) scene: &'a Scene,
-    pub(in crate::integrators) common: Common,
+pub(super) struct Eye<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) common: Common,
     /// Width and height, pixels.
-    pub(in crate::integrators) size: (usize, usize),
+    pub(super) size: (usize, usize),
     /// Roughness from which lobes are measured at.
-    pub(in crate::integrators) threshold: f32,
+    pub(super) threshold: f32,
 }
 
 impl<'a> Eye<'a> {
@@ -63,9 +63,9 @@ impl<'a> Eye<'a> {
         self.size.0 * self.size.1
     }
 
-    /// An iteration's subpath of a pixel.
-    pub(super) fn sample(&self, iteration: u64, pixel: usize, radius: Radius, tally: &mut Tally) -> Seen<'a> {
-        let mut stream = pixel_stream(self.common.seed, iteration, pixel, Purpose::Camera);
+    /// An iteration's subpath of a pixel, for the purpose that its key has.
+    pub(super) fn sample(&self, (iteration, purpose): (u64, Purpose), pixel: usize, radius: Radius, tally: &mut Tally) -> Seen<'a> {
+        let mut stream = pixel_stream(self.common.seed, iteration, pixel, purpose);
         let jitter = Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         self.measure(pixel, jitter, lens, radius, &mut stream, tally)
@@ -134,7 +134,7 @@ impl<'a> Eye<'a> {
     }
 
     /// Median footprint over pixel centres, on a key of its own ([interface: Footprint]).
-    pub(in crate::integrators) fn median_footprint(&self, stats: &mut IterationStats) -> Option<f32> {
+    pub(super) fn median_footprint(&self, stats: &mut IterationStats) -> Option<f32> {
         let mut tally = Tally::default();
         let mut footprints: Vec<f32> = Vec::new();
         for pixel in 0..self.pixels() {
