@@ -1,8 +1,11 @@
 //! Light subpaths of samplers with targets: what the camera sees first, then chains that aim at it.
 //!
 //! A path counts for `W_p`, the sum over its strata of scale times weight; an independent one would count for `1/N`. Flux at its vertices and
-//! what it splats are multiplied by `N W_p`, so that all that follows may take the path for an independent one. Weights of techniques are those of
-//! uniform densities: they sum to 1 for every path whoever draws it.
+//! what it splats are multiplied by `N W_p`, so that all that follows may take the path for an independent one.
+//!
+//! Weights of techniques sum to 1 for every path whoever draws it, if they are functions of the path that the iteration's own samples do not
+//! move. They take splats and merges at a vertex to be `N g` samples, `g` the density of light subpaths there over that of independent ones, as the
+//! ladder foresees it ([`Gain`](crate::targets::aimed::Gain)); `g` is 1 in the first iteration.
 
 use super::super::IterationStats;
 use super::super::aimed::{Aimed, Sights, look};

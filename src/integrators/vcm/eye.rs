@@ -41,6 +41,7 @@ impl<'a> Iteration<'a, '_> {
         }
         let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
+        let partner = if self.techniques.connections { light.partner(number) } else { None };
         let mut sum = Rgb::BLACK;
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
             if vertex.hit.emitter.is_some() {
@@ -51,10 +52,11 @@ impl<'a> Iteration<'a, '_> {
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
-                    let (factor, partners) = light.partner(number);
-                    for (partner, letters) in partners {
-                        let found = self.connect(vertex, &point, (partner, letters, factor), tally, record);
-                        sum += tally.finite(found);
+                    if let Some(partner) = &partner {
+                        for (end, letters) in partner.vertices() {
+                            let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
+                            sum += tally.finite(found);
+                        }
                     }
                 }
                 if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {

@@ -23,6 +23,7 @@ use crate::transport::survival::Met;
 use crate::transport::walk::Tally;
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A vertex of a light subpath whose surface has a lobe that is no delta: 116 bytes.
 #[derive(Clone, Copy, Debug)]
@@ -200,24 +201,33 @@ impl LightSide {
         Self { batches, firsts, paths, pairing }
     }
 
-    /// The vertices that camera subpath number `pixel` is connected to, each with the events before it, and the factor on what they bring: one
-    /// over the number of light subpaths and the probability of this one.
-    pub(super) fn partner(&self, pixel: usize) -> (f32, impl Iterator<Item = (&LightVertex, Letters)>) {
-        let partner = match &self.pairing {
-            None => Some((pixel % self.paths.max(1), 1.0)),
-            Some(pairing) => pairing.partner(pixel),
+    /// The light subpath that camera subpath number `pixel` is connected to; `None` where there is none.
+    pub(super) fn partner(&self, pixel: usize) -> Option<Partner<'_>> {
+        let (path, factor) = match &self.pairing {
+            None => (pixel % self.paths.max(1), 1.0),
+            Some(pairing) => pairing.partner(pixel)?,
         };
-        let (path, factor) = partner.unwrap_or_default();
         let number = self.firsts.partition_point(|&first| first <= path).saturating_sub(1);
-        let found = self.batches.get(number).filter(|_| partner.is_some()).map(|batch| {
-            let place = path - self.firsts[number];
-            let start = place.checked_sub(1).map_or(0, |before| batch.ends[before] as usize);
-            (batch, start..batch.ends[place] as usize)
-        });
-        let vertices = found
-            .into_iter()
-            .flat_map(|(batch, range)| range.map(move |i| (&batch.vertices[i], batch.letters.get(i).copied().unwrap_or_default())));
-        (factor, vertices)
+        let batch = self.batches.get(number)?;
+        let place = path - self.firsts[number];
+        let start = place.checked_sub(1).map_or(0, |before| batch.ends[before] as usize);
+        Some(Partner { batch, range: start..batch.ends[place] as usize, factor })
+    }
+}
+
+/// A light subpath that a camera subpath is connected to.
+pub(super) struct Partner<'b> {
+    batch: &'b Batch,
+    range: Range<usize>,
+    /// On what connections bring: one over the number of light subpaths and the probability of this one.
+    pub(super) factor: f32,
+}
+
+impl<'b> Partner<'b> {
+    /// Its vertices, each with the events before it.
+    pub(super) fn vertices(&self) -> impl Iterator<Item = (&'b LightVertex, Letters)> + use<'b> {
+        let batch = self.batch;
+        self.range.clone().map(move |i| (&batch.vertices[i], batch.letters.get(i).copied().unwrap_or_default()))
     }
 }
 
