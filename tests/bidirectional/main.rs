@@ -62,15 +62,16 @@ fn path_mean(scene: &LoadedScene, base: &Common, iterations: u64) -> Sample {
     Sample::of(&(1..=SEEDS).map(run).collect::<Vec<_>>())
 }
 
-/// A technique alone, its mean at radius 0 if it merges.
-fn alone(scene: &LoadedScene, technique: &str, base: &Common, iterations: u64) -> Sample {
-    let settings = |more: &str| format!("{{\"alone\": \"{technique}\"{more}}}");
+/// A technique alone, its mean at radius 0 if it merges; `sampler` is what is said of the light subpaths.
+fn alone(scene: &LoadedScene, technique: &str, sampler: &str, base: &Common, iterations: u64) -> Sample {
+    let settings = |more: &str| format!("{{\"alone\": \"{technique}\"{sampler}{more}}}");
     if !technique.starts_with("vm") {
         return mean(scene, "bdpt", &settings(""), base, iterations);
     }
     let radii = [0.04, 0.06, 0.08, 0.12];
     let at = |(k, radius): (usize, &f64)| {
-        let more = format!(", \"radius\": {radius}, \"alpha\": 1.0, \"photons\": 4000");
+        let photons = if sampler.is_empty() { ", \"photons\": 4000" } else { "" };
+        let more = format!(", \"radius\": {radius}, \"alpha\": 1.0{photons}");
         let run = |s| {
             let base = Common { seed: 100 * (k as u64 + 1) + s, ..base.clone() };
             image_mean(&support::render(scene, "vcm", &settings(&more), &base, iterations).0)
@@ -104,7 +105,7 @@ const CASES: [(&str, &str, &[&str]); 13] = [
 
 /// Every technique that can make a path of a class has the path tracer's mean, alone and with weight 1. `precision` is the largest relative
 /// standard error of a comparison that counts as one.
-fn pure(iterations: u64, precision: f64, asked: impl Fn(&str, &str) -> bool) {
+fn pure(iterations: u64, precision: f64, sampler: &str, asked: impl Fn(&str, &str) -> bool) {
     let threshold = sidak(0.01, CASES.iter().map(|(.., techniques)| techniques.len()).sum());
     let (mut failures, mut compared) = (Vec::new(), 0);
     for (light, class, techniques) in CASES {
@@ -116,7 +117,7 @@ fn pure(iterations: u64, precision: f64, asked: impl Fn(&str, &str) -> bool) {
         }
         let path = path_mean(&scene, &base, 8 * iterations);
         for technique in techniques {
-            let sample = alone(&scene, technique, &base, iterations);
+            let sample = alone(&scene, technique, sampler, &base, iterations);
             let p = welch(&sample, &path);
             let spread = (sample.variance + path.variance).sqrt() / path.mean;
             let line = format!("{class} {technique}: ratio {:.4} +- {spread:.4}, p {p:.1e}", sample.mean / path.mean);
@@ -132,20 +133,28 @@ fn pure(iterations: u64, precision: f64, asked: impl Fn(&str, &str) -> bool) {
 
 #[test]
 fn each_technique_alone_is_the_path_tracer() {
-    pure(24, 0.1, |class, technique| class == "LDE" || class == "LDDE" && !technique.starts_with("vm") && technique != "vc0");
+    pure(24, 0.1, "", |class, technique| class == "LDE" || class == "LDDE" && !technique.starts_with("vm") && technique != "vc0");
 }
 
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn each_technique_alone_is_the_path_tracer_closely() {
-    pure(256, 0.1, |class, technique| !(class == "LDGDE" && technique.starts_with("vm")));
+    pure(256, 0.1, "", |class, technique| !(class == "LDGDE" && technique.starts_with("vm")));
 }
 
 /// The noisiest of them: three times the iterations for the same precision.
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn merges_alone_on_a_glossy_path_are_the_path_tracer() {
-    pure(768, 0.1, |class, technique| class == "LDGDE" && technique.starts_with("vm"));
+    pure(768, 0.1, "", |class, technique| class == "LDGDE" && technique.starts_with("vm"));
+}
+
+/// Those that use light subpaths, drawn by chains in every iteration: each path counts for what its strata say, in splats, connections and merges.
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn techniques_alone_by_chains_are_the_path_tracer() {
+    let sampler = ", \"sampler\": \"visibility\", \"rest\": \"never\", \"burn_in\": 200, \"photons\": 4000";
+    pure(64, 0.1, sampler, |class, technique| ["LDE", "LDDE"].contains(&class) && !["vc0", "vc1"].contains(&technique));
 }
 
 /// All techniques together, by every heuristic.

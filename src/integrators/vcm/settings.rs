@@ -128,7 +128,7 @@ pub struct BdptSettings {
     /// Photon sampler
     #[arg(long, value_enum, default_value_t, value_name = "NAME")]
     pub sampler: SamplerName,
-    /// Light paths per iteration; default one a pixel
+    /// Light paths per iteration; default one a pixel, at least 100,000 for Metropolis samplers
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photons: Option<u64>,
