@@ -59,21 +59,29 @@ against_shared! {
 }
 
 macro_rules! bidirectional_against_shared {
-    ($($test:ident: $scene:literal, $iterations:literal;)*) => {$(
+    ($($test:ident: $method:literal, $settings:expr, $scene:literal, $iterations:literal;)*) => {$(
         #[test]
         #[ignore = "minutes; run by .ci/run"]
         fn $test() {
-            method_agrees("bdpt", "{}", $scene, $iterations);
+            method_agrees($method, $settings, $scene, $iterations);
         }
     )*};
 }
 
+/// A radius so small that its bias is below the noise.
+const SMALL_RADIUS: &str = "{\"radius_pixels\": 0.1, \"alpha\": 1.0}";
+
 bidirectional_against_shared! {
-    bdpt_on_cbox_spheres: "cbox-spheres", 64;
-    bdpt_on_cornell_box: "cornell-box", 64;
-    bdpt_on_modern_hall: "modern-hall", 64;
-    bdpt_on_veach_bidir: "veach-bidir", 64;
-    bdpt_on_veach_mis: "veach-mis", 64;
+    bdpt_on_cbox_spheres: "bdpt", "{}", "cbox-spheres", 64;
+    bdpt_on_cornell_box: "bdpt", "{}", "cornell-box", 64;
+    bdpt_on_modern_hall: "bdpt", "{}", "modern-hall", 64;
+    bdpt_on_veach_bidir: "bdpt", "{}", "veach-bidir", 64;
+    bdpt_on_veach_mis: "bdpt", "{}", "veach-mis", 64;
+    vcm_on_cbox_spheres: "vcm", SMALL_RADIUS, "cbox-spheres", 32;
+    vcm_on_cornell_box: "vcm", SMALL_RADIUS, "cornell-box", 32;
+    vcm_on_modern_hall: "vcm", SMALL_RADIUS, "modern-hall", 32;
+    vcm_on_veach_bidir: "vcm", SMALL_RADIUS, "veach-bidir", 32;
+    vcm_on_veach_mis: "vcm", SMALL_RADIUS, "veach-mis", 32;
 }
 
 /// The scenes of this repository that have a reference, and iterations a run.
@@ -151,11 +159,10 @@ fn bdpt_on_feature_scenes() {
     feature_scenes("bdpt", "{}", 0.25);
 }
 
-/// A radius so small that its bias is below the noise.
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn vcm_on_feature_scenes() {
-    feature_scenes("vcm", "{\"radius_pixels\": 0.1, \"alpha\": 1.0}", 0.25);
+    feature_scenes("vcm", SMALL_RADIUS, 0.25);
 }
 
 /// Radius extrapolation: `E(r) = I + a r + c r^2` on constant radii, fitted on run means; the intercept meets the reference. (A disk that
