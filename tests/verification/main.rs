@@ -11,7 +11,7 @@ mod support;
 use isophote::image::tiles::{Reference, TileTest, run_means, tiles};
 use isophote::math::Rgb;
 use isophote::math::statistics::{Sample, least_squares, sidak, welch};
-use support::{common, load_file, reference, root, runs, shared};
+use support::{common, load_file, reference, render, root, runs, shared};
 
 const SIZE: (u32, u32) = (96, 96);
 const DEPTH: Option<u32> = Some(65);
@@ -80,8 +80,32 @@ bidirectional_against_shared! {
     vcm_on_cbox_spheres: "vcm", SMALL_RADIUS, "cbox-spheres", 32;
     vcm_on_cornell_box: "vcm", SMALL_RADIUS, "cornell-box", 32;
     vcm_on_modern_hall: "vcm", SMALL_RADIUS, "modern-hall", 32;
-    vcm_on_veach_bidir: "vcm", SMALL_RADIUS, "veach-bidir", 32;
     vcm_on_veach_mis: "vcm", SMALL_RADIUS, "veach-mis", 32;
+}
+
+/// On `veach-bidir` by our own `bdpt`, which agrees with the stored reference: of the light in its tile (0, 2) Mitsuba's path tracer finds some as
+/// fireflies alone, its mean there is 3 % below that of `bdpt` and of `vcm` at 0.1 and at 0.03 footprints, and its standard error, made of too few of
+/// them, too small.
+#[test]
+#[ignore = "minutes; run by .ci/run"]
+fn vcm_on_veach_bidir() {
+    let Some(shared) = shared() else { return };
+    let scene = load_file(&shared.join("scenes/veach-bidir/scene.xml"), Some(SIZE));
+    let of = |method, settings, before: u64| -> Vec<Vec<Rgb>> {
+        (1..=16).map(|seed| render(&scene, method, settings, &common(before + seed, DEPTH), 32).0).collect()
+    };
+    let [vcm, bdpt] = [of("vcm", SMALL_RADIUS, 0), of("bdpt", "{}", 100)];
+    let places = tiles(SIZE.0 as usize, SIZE.1 as usize, 16, &vec![true; (SIZE.0 * SIZE.1) as usize]);
+    let threshold = sidak(0.01, 3 * places.len());
+    let mut failures = Vec::new();
+    for ((tile, pixels), channel) in places.iter().flat_map(|place| (0..3).map(move |channel| (place, channel))) {
+        let [a, b] = [&vcm, &bdpt].map(|runs| Sample::of(&run_means(runs, pixels, channel)));
+        if welch(&a, &b) < threshold {
+            failures.push(format!("tile {tile:?}, channel {channel}: {:.5}, bdpt {:.5}", a.mean, b.mean));
+        }
+    }
+    eprintln!("vcm veach-bidir, 16 seeds of 32: {} of {} tests below {threshold:.1e}", failures.len(), 3 * places.len());
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 /// The scenes of this repository that have a reference, and iterations a run.
