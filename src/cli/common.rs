@@ -7,6 +7,7 @@ use super::output;
 use super::scene::{self, SceneArgs};
 use crate::image::film::Film;
 use crate::image::layers::LayerSums;
+use crate::image::readings::Readings;
 use crate::integrators::{BoxedSettings, Method};
 use crate::render::{Bar, Changes, IterationRange, Lines, Progress, Silent};
 use crate::scene::mitsuba::LoadedScene;
@@ -67,12 +68,14 @@ impl CommonArgs {
         Ok(loaded)
     }
 
-    /// Refuses what takes more memory than allowed. `moments`: the film keeps squares as well; `images`: so many further images.
-    pub(super) fn check_memory(&self, loaded: &LoadedScene, moments: bool, images: usize) -> Result<(), Failure> {
+    /// Refuses what takes more memory than allowed. `moments`: the film keeps squares as well; `images`: so many
+    /// further images, of techniques and of readings.
+    pub(super) fn check_memory(&self, loaded: &LoadedScene, moments: bool, images: [usize; 2]) -> Result<(), Failure> {
         let Some(Size(limit)) = self.max_memory else { return Ok(()) };
         let (width, height) = loaded.scene.camera().resolution();
-        let (scene, film) =
-            (scene::bytes(loaded), Film::bytes(width, height, moments) + LayerSums::bytes(images, width as u64 * height as u64));
+        let pixels = width as u64 * height as u64;
+        let further = LayerSums::bytes(images[0], pixels) + Readings::bytes(images[1], pixels);
+        let (scene, film) = (scene::bytes(loaded), Film::bytes(width, height, moments) + further);
         if scene + film <= limit {
             return Ok(());
         }

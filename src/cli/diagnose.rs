@@ -80,7 +80,7 @@ fn diagnose_scene(arguments: &DiagnoseArgs, verbosity: Verbosity) -> Outcome {
     let running = signals::listen(&interrupt, verbosity, "ending after the running iteration")?;
     let shared = &arguments.common;
     let loaded = shared.open(verbosity)?;
-    shared.check_memory(&loaded, false, 0)?;
+    shared.check_memory(&loaded, false, [0, 0])?;
     let size = loaded.scene.camera().resolution();
     let changes = shared.changes();
     let common = changes.common(arguments.seed, &loaded.defaults);

@@ -57,7 +57,7 @@ fn reference(arguments: &ReferenceArgs, method: &'static Method, settings: &dyn 
     }
     let shared = &arguments.common;
     let loaded = shared.open(verbosity)?;
-    shared.check_memory(&loaded, true, 0)?;
+    shared.check_memory(&loaded, true, [0, 0])?;
     let job = Job {
         scene: SceneRecord { path: shared.scene.scene.display().to_string(), hash: loaded.content_hash.clone() },
         changes: &shared.changes(),

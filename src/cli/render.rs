@@ -25,6 +25,8 @@ enum Aov {
     Count,
     /// What every technique brings to paths of every length, with its weight and without, and a contact sheet (bdpt, vcm)
     Pyramid,
+    /// Photons per square unit and light subpath where the pixel measures (sppm; vcm with vcm-plus or vcm-star)
+    Density,
 }
 
 /// Options of rendering one image.
@@ -97,7 +99,9 @@ fn render_scene(arguments: &RenderArgs, method: &Method, settings: &dyn BoxedSet
     let record = SceneRecord { path: shared.scene.scene.display().to_string(), hash: loaded.content_hash.clone() };
     let metadata = Metadata::new(record, method.name, changes.settings_json(settings, &common, &loaded.film));
     let mut integrator = settings.build(&loaded.scene, plan.size, &common)?;
-    let images = if plan.output.layers.pyramid { integrator.technique_layers()?.len() } else { 0 };
+    let techniques = if plan.output.layers.pyramid { integrator.technique_layers()?.len() } else { 0 };
+    let densities = if plan.output.layers.density { integrator.density_images()?.len() } else { 0 };
+    let images = [techniques, densities];
     shared.check_memory(&loaded, plan.output.layers.variance, images)?;
     let mut progress = progress(verbosity);
     rendering.store(true, Ordering::SeqCst);
@@ -117,7 +121,8 @@ fn output_of(arguments: &RenderArgs, method: &str) -> Result<Output, Failure> {
         check_writable(preview)?;
     }
     let asked = |aov| arguments.aov.contains(&aov);
-    let layers = Layers { variance: asked(Aov::Variance), count: asked(Aov::Count), pyramid: asked(Aov::Pyramid) };
+    let layers =
+        Layers { variance: asked(Aov::Variance), count: asked(Aov::Count), pyramid: asked(Aov::Pyramid), density: asked(Aov::Density) };
     let output = Output { path, layers, preview };
     if layers.pyramid {
         check_writable(&output.sheet())?;

@@ -1,6 +1,7 @@
 //! The film keeps sums and counts, never means, so that films add.
 
 use super::layers::LayerSums;
+use super::readings::Readings;
 use crate::math::Rgb;
 use glam::Vec2;
 use std::ops::Range;
@@ -40,6 +41,9 @@ pub enum FilmError {
         "one film has images of techniques that the other has not: render both with --aov pyramid and the same techniques and depths, or neither"
     )]
     Layers,
+    /// The films keep readings of other kinds.
+    #[error("one film has densities that the other has not: render both with --aov density, or neither")]
+    Readings,
     /// A list of sums is neither empty (where it may be) nor one entry a pixel.
     #[error("the film's {part} has {found} pixels where {expected} are needed")]
     Part {
@@ -93,6 +97,8 @@ pub struct Film {
     running: Sums,
     /// Further images, where they are asked for.
     layers: Option<LayerSums>,
+    /// Numbers read beside the image, where they are asked for.
+    readings: Option<Readings>,
 }
 
 impl Film {
@@ -101,7 +107,7 @@ impl Film {
         let n = width * height;
         let blank = |wanted: bool| if wanted { vec![[0.0; 3]; n] } else { Vec::new() };
         let sums = RawFilm { width, height, eye: blank(true), squares: blank(moments), ..RawFilm::default() };
-        Self { sums, running: blank(moments), layers: None }
+        Self { sums, running: blank(moments), layers: None, readings: None }
     }
 
     /// Most bytes a film of this size can hold.
@@ -254,6 +260,21 @@ impl Film {
         self.layers.take()
     }
 
+    /// Numbers read beside the image, if the film keeps any.
+    pub fn readings(&self) -> Option<&Readings> {
+        self.readings.as_ref()
+    }
+
+    /// From now on the film keeps these.
+    pub fn keep_readings(&mut self, readings: Readings) {
+        self.readings = Some(readings);
+    }
+
+    /// The readings, for a method to add to: it gives them back by [`Film::keep_readings`].
+    pub fn take_readings(&mut self) -> Option<Readings> {
+        self.readings.take()
+    }
+
     /// Means of the further images, in the order of their numbers: over camera-side samples or over light paths.
     pub fn layer_means(&self) -> Vec<Vec<Rgb>> {
         let mean = |layers: &LayerSums, i: usize| {
@@ -297,7 +318,7 @@ impl Film {
             }
         }
         let running = vec![[0.0; 3]; raw.squares.len()];
-        Ok(Self { sums: raw, running, layers: None })
+        Ok(Self { sums: raw, running, layers: None, readings: None })
     }
 
     /// Adds another film's sums and counts.
@@ -316,6 +337,13 @@ impl Film {
         };
         if !same {
             return Err(FilmError::Layers);
+        }
+        let same = match (&mut self.readings, &other.readings) {
+            (Some(left), Some(right)) => left.merge(right),
+            (left, right) => left.is_none() && right.is_none(),
+        };
+        if !same {
+            return Err(FilmError::Readings);
         }
         add_all(&mut left.eye, &right.eye);
         add_all(&mut left.splats, &right.splats);

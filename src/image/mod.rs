@@ -7,6 +7,7 @@ pub mod layers;
 pub mod metrics;
 pub mod picture;
 pub mod ramp;
+pub mod readings;
 pub mod runs;
 pub mod sheet;
 pub mod tiles;

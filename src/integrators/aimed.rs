@@ -46,6 +46,11 @@ impl Sights<'_> {
     pub(super) fn has_regions(&self) -> bool {
         self.aimer.regions.is_some()
     }
+
+    /// The density of the region around a measurement point that the target uses, by the point's number; `None` without one.
+    pub(super) fn region_density(&self, point: usize) -> Option<f64> {
+        self.aimer.density(self.aims[point].leaf)
+    }
 }
 
 impl Aimed {
@@ -58,6 +63,11 @@ impl Aimed {
             refinement: settings.refinement(),
             rest: plan.rest,
         }
+    }
+
+    /// Do targets read the densities of regions?
+    pub(super) fn has_regions(&self) -> bool {
+        self.regions != RegionKind::None
     }
 
     /// Looks where the camera measures, and builds the tree of regions. Returns the median radius; `None` without a measurement point.

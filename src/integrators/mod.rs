@@ -92,6 +92,10 @@ pub trait Integrator: Send {
     fn technique_layers(&self) -> Result<Vec<Layer>, MethodError> {
         Err(MethodError::NoTechniques)
     }
+    /// The densities of light paths that a film is to keep for `--aov density`, by name; iterations add to them by their place here.
+    fn density_images(&self) -> Result<&'static [&'static str], MethodError> {
+        Err(MethodError::NoDensity)
+    }
     /// What the sampler of light paths tells of its chains, if it has any.
     fn chains(&self) -> Option<ChainReport> {
         None
@@ -112,6 +116,14 @@ pub enum MethodError {
     /// The method has one way to make a path, or does not tell its ways apart.
     #[error("--aov pyramid shows the techniques of bdpt and vcm; this method has none to show: leave it out")]
     NoTechniques,
+    /// The method does not know how densely photons lie.
+    #[error(
+        "--aov density shows how densely photons lie, which sppm knows, and vcm with --merge-weights vcm-plus or vcm-star: leave it out"
+    )]
+    NoDensity,
+    /// The map counts light subpaths as they are drawn.
+    #[error("--aov density of vcm reads a map that counts light subpaths as drawn: give --sampler uniform, or use the method sppm")]
+    DensityAsDrawn,
     /// A pyramid without end.
     #[error("--aov pyramid keeps an image of every technique of every path length: give --max-depth D, at most {most}")]
     PyramidDepth {

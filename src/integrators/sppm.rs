@@ -54,6 +54,11 @@ impl Settings for SppmSettings {
     }
 }
 
+/// Images of densities, by their numbers; the second only where targets read regions.
+const DENSITY_IMAGES: &[&str] = &["density", "density.region"];
+const DENSITY: usize = 0;
+const REGION_DENSITY: usize = 1;
+
 /// SPPM bound to a scene.
 struct Sppm<'a> {
     eye: Eye<'a>,
@@ -186,6 +191,11 @@ impl Integrator for Sppm<'_> {
             document["sampler"] = aimed.report().to_json();
         }
         Some(document)
+    }
+
+    fn density_images(&self) -> Result<&'static [&'static str], MethodError> {
+        let regions = self.aimed.as_ref().is_some_and(Aimed::has_regions);
+        Ok(if regions { DENSITY_IMAGES } else { &DENSITY_IMAGES[..1] })
     }
 
     fn chains(&self) -> Option<ChainReport> {

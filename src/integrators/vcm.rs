@@ -7,6 +7,7 @@
 //! A sampler with a target needs to know first what the camera sees (`aimed`).
 
 mod aimed;
+mod density;
 mod eye;
 mod iteration;
 mod light;
@@ -114,6 +115,7 @@ impl<'a> Engine<'a> {
             size: self.size,
             depths: self.depths(),
             radius: sampling.radius as f32,
+            light_paths: sampling.light_paths,
             merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
             gain: None,
             alone: self.alone,
@@ -187,7 +189,7 @@ impl Integrator for Engine<'_> {
             _ => (self.shoot(&iteration, film, &mut stats), None),
         };
         let merging = self.techniques.merges.then(|| Merging::new(&light, Grid::cell_for(iteration.radius)));
-        iteration.camera_side(film, &light, merging.as_ref(), &mut stats);
+        iteration.camera_side(film, &light, merging.as_ref(), density.as_ref(), &mut stats);
         // Only now, when every weight of the iteration is known.
         if let (Some(map), Some(merging)) = (&mut density, &merging) {
             let grid = merging.store.grid();
@@ -211,6 +213,16 @@ impl Integrator for Engine<'_> {
     fn technique_layers(&self) -> Result<Vec<Layer>, MethodError> {
         let pyramid = Pyramid::new(self.techniques, self.depths()).ok_or(MethodError::PyramidDepth { most: pyramid::LONGEST })?;
         Ok(pyramid.layers())
+    }
+
+    fn density_images(&self) -> Result<&'static [&'static str], MethodError> {
+        if !(self.techniques.merges && self.heuristic.asks_density()) {
+            return Err(MethodError::NoDensity);
+        }
+        if self.aimed.is_some() {
+            return Err(MethodError::DensityAsDrawn);
+        }
+        Ok(&["density"])
     }
 
     fn diagnostics(&self) -> Option<Value> {

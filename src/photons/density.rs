@@ -150,6 +150,11 @@ impl DensityMap {
         count * (area / (self.settings.cell * self.settings.cell * *passes as f32))
     }
 
+    /// Light vertices per world unit squared and pass around `p`, as [`DensityMap::photons`] has them; `None` before the first pass.
+    pub fn density(&self, p: Vec3) -> Option<f32> {
+        (self.snapshot.passes > 0).then(|| self.photons(p, 1.0))
+    }
+
     /// Filtered count in an eighth of the cube whose corners are the centres of eight cells, rounding kept from going below 1; 1 where all eight are empty.
     #[cold]
     #[inline(never)]

@@ -10,6 +10,7 @@ use crate::image::film::Film;
 use crate::image::layers::{Layer, LayerSums};
 use crate::image::metrics::{EPSILON, Pairs, SizeMismatch};
 use crate::image::picture::{ImageError, Picture};
+use crate::image::readings::Readings;
 use crate::image::sheet::contact_sheet;
 use crate::image::tonemap::{Exposure, write_png};
 use crate::integrators::{Integrator, IterationStats, MethodError};
@@ -65,6 +66,8 @@ pub struct Layers {
     pub count: bool,
     /// The images of single techniques, and a contact sheet of them ([`Output::sheet`]).
     pub pyramid: bool,
+    /// `density.Y`, and where targets read regions `density.region.Y`: light vertices per world unit squared and light subpath.
+    pub density: bool,
 }
 
 /// What is written, and where.
@@ -103,6 +106,10 @@ impl Output {
         }
         if self.layers.count {
             planes.push(Plane::Scalar("count".into(), vec![film.eye_count() as f32; picture.pixels.len()]));
+        }
+        if let Some(readings) = film.readings() {
+            let names = readings.names().iter().enumerate();
+            planes.extend(names.map(|(image, &name)| Plane::Scalar(name.into(), readings.mean(image))));
         }
         let means = film.layer_means();
         let layers = film.layers().map_or(&[][..], LayerSums::layers);
@@ -186,6 +193,9 @@ pub fn render(
         return Err(RenderError::Stateful { method: metadata.method, start });
     }
     let mut film = Film::new(plan.size.0, plan.size.1, plan.output.layers.variance);
+    if plan.output.layers.density {
+        film.keep_readings(Readings::new(method.density_images()?, plan.size.0 * plan.size.1));
+    }
     if plan.output.layers.pyramid {
         film.keep_layers(LayerSums::new(method.technique_layers()?, plan.size.0 * plan.size.1));
     }

@@ -57,6 +57,8 @@ pub struct Aimer {
     refinement: Refinement,
     /// Compressed inverse densities by leaf, in a scale that gives the full target a mean of one when they are read; empty before.
     inverse_densities: Vec<f64>,
+    /// The densities themselves, paths of the uniform sampler per world unit squared, by leaf; empty before they are read.
+    densities: Vec<f64>,
     /// Regions read.
     region_count: usize,
     /// Where the camera has measured.
@@ -97,6 +99,7 @@ impl Aimer {
             place,
             refinement,
             inverse_densities: Vec::new(),
+            densities: Vec::new(),
             region_count: 0,
             seen: Seen::default(),
             cells: Cells::new(depths),
@@ -110,6 +113,12 @@ impl Aimer {
     /// Regions that the present densities come from.
     pub fn region_count(&self) -> usize {
         self.region_count
+    }
+
+    /// The density of a leaf that the present targets use: light paths under uniform sampling, per world unit squared and path; `None` before
+    /// one is known.
+    pub fn density(&self, leaf: u32) -> Option<f64> {
+        self.densities.get(leaf as usize).copied()
     }
 
     /// Where the present targets are positive.
@@ -188,10 +197,11 @@ impl Aimer {
             return false;
         }
         self.region_count = count;
-        let mut inverses: Vec<f64> = densities.into_iter().map(|density| inverse((density / densest).min(1.0))).collect();
+        let mut inverses: Vec<f64> = densities.iter().map(|density| inverse((density / densest).min(1.0))).collect();
         let mean = aims.iter().map(|aim| f64::from(aim.kernel) * inverses[aim.leaf as usize]).sum::<f64>() / aims.len() as f64;
         inverses.iter_mut().for_each(|value| *value /= mean);
         self.inverse_densities = inverses;
+        self.densities = densities;
         true
     }
 }

@@ -163,6 +163,22 @@ pub fn collect<V: Left>(batches: &[Deposits<V>], scales: &[f64], points: usize) 
     sums
 }
 
+/// At every point the light vertices that it took, as many as independent paths would have left were there one of them: paths by what they count
+/// for, strata scaled.
+pub fn vertices<V: Left>(batches: &[Deposits<V>], scales: &[f64], points: usize) -> Vec<f64> {
+    let factors: Vec<Vec<[f64; 2]>> = batches.par_iter().map(|batch| batch.shares.factors(scales)).collect();
+    let mut sums = vec![0.0; points];
+    let each = points.div_ceil(LISTS).max(1);
+    sums.par_chunks_mut(each).enumerate().with_max_len(1).for_each(|(list, sums)| {
+        for (batch, factors) in batches.iter().zip(&factors) {
+            for deposit in &batch.lists[list] {
+                sums[deposit.point as usize - list * each] += factors[deposit.path.index()][0];
+            }
+        }
+    });
+    sums
+}
+
 /// The two halves' statistics of regions, from those of their points.
 pub fn halves(collected: &[Collected], leaf: impl Fn(usize) -> u32, leaves: usize) -> [Half; 2] {
     [0, 1].map(|half| {

@@ -5,10 +5,11 @@
 mod support;
 
 use isophote::integrators::Common;
+use isophote::math::Rgb;
 use isophote::math::statistics::{Sample, least_squares, sidak, welch};
 use isophote::scene::mitsuba::LoadedScene;
 use isophote::transport::class::pattern;
-use support::{common, image_mean, load_file, load_text, runs, sensor};
+use support::{common, image_mean, load_file, load_text, runs, runs_of, sensor};
 
 const SEEDS: u64 = 16;
 
@@ -51,15 +52,17 @@ const SKY: &str = "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.5
 const SPOT: &str = "<emitter type=\"spot\"><transform name=\"to_world\"><lookat origin=\"0.1, 0.8, 0\" target=\"0.2, -0.6, 0.2\" \
      up=\"0, 0, 1\"/></transform><rgb name=\"intensity\" value=\"6, 5, 4\"/><float name=\"cutoff_angle\" value=\"60\"/></emitter>";
 
+fn means(images: &[Vec<Rgb>]) -> Sample {
+    Sample::of(&images.iter().map(|image| image_mean(image)).collect::<Vec<_>>())
+}
+
 /// Runs of one kind must be independent of those of all others: seeds of their own.
 fn mean(scene: &LoadedScene, method: &str, settings: &str, base: &Common, iterations: u64) -> Sample {
-    let images = runs(scene, method, settings, base, iterations, SEEDS);
-    Sample::of(&images.iter().map(|i| image_mean(i)).collect::<Vec<_>>())
+    means(&runs(scene, method, settings, base, iterations, SEEDS))
 }
 
 fn path_mean(scene: &LoadedScene, base: &Common, iterations: u64) -> Sample {
-    let run = |s| image_mean(&support::render(scene, "path", "{}", &Common { seed: 5000 + s, ..base.clone() }, iterations).0);
-    Sample::of(&(1..=SEEDS).map(run).collect::<Vec<_>>())
+    means(&runs_of(scene, "path", "{}", base, iterations, 5001..=5000 + SEEDS))
 }
 
 /// A technique alone, its mean at radius 0 if it merges; `sampler` is what is said of the light subpaths.
@@ -72,11 +75,8 @@ fn alone(scene: &LoadedScene, technique: &str, sampler: &str, base: &Common, ite
     let at = |(k, radius): (usize, &f64)| {
         let photons = if sampler.is_empty() { ", \"photons\": 4000" } else { "" };
         let more = format!(", \"radius\": {radius}, \"alpha\": 1.0{photons}");
-        let run = |s| {
-            let base = Common { seed: 100 * (k as u64 + 1) + s, ..base.clone() };
-            image_mean(&support::render(scene, "vcm", &settings(&more), &base, iterations).0)
-        };
-        Sample::of(&(1..=SEEDS).map(run).collect::<Vec<_>>())
+        let before = 100 * (k as u64 + 1);
+        means(&runs_of(scene, "vcm", &settings(&more), base, iterations, before + 1..=before + SEEDS))
     };
     let samples: Vec<Sample> = radii.iter().enumerate().map(at).collect();
     let rows: Vec<Vec<f64>> = radii.iter().map(|r: &f64| vec![1.0, *r, r * r]).collect();

@@ -11,7 +11,7 @@ mod support;
 use isophote::image::tiles::{Reference, TileTest, run_means, tiles};
 use isophote::math::Rgb;
 use isophote::math::statistics::{Sample, least_squares, sidak, welch};
-use support::{common, load_file, reference, render, root, runs, shared};
+use support::{common, load_file, reference, root, runs, runs_of, shared};
 
 const SIZE: (u32, u32) = (96, 96);
 const DEPTH: Option<u32> = Some(65);
@@ -91,9 +91,7 @@ bidirectional_against_shared! {
 fn vcm_on_veach_bidir() {
     let Some(shared) = shared() else { return };
     let scene = load_file(&shared.join("scenes/veach-bidir/scene.xml"), Some(SIZE));
-    let of = |method, settings, before: u64| -> Vec<Vec<Rgb>> {
-        (1..=16).map(|seed| render(&scene, method, settings, &common(before + seed, DEPTH), 32).0).collect()
-    };
+    let of = |method, settings, before: u64| runs_of(&scene, method, settings, &common(0, DEPTH), 32, before + 1..=before + 16);
     let [vcm, bdpt] = [of("vcm", SMALL_RADIUS, 0), of("bdpt", "{}", 100)];
     let places = tiles(SIZE.0 as usize, SIZE.1 as usize, 16, &vec![true; (SIZE.0 * SIZE.1) as usize]);
     let threshold = sidak(0.01, 3 * places.len());
@@ -209,13 +207,8 @@ fn sppm_extrapolates(name: &str, radii: [f64; 5], photons: u64, iterations: u64,
         .map(|(k, radius)| {
             let settings = format!("{{\"radius_pixels\": {radius}, \"alpha\": 1.0, \"photons\": {photons}}}");
             // Radii must be independent: seeds of their own.
-            let base = common(0, DEPTH);
-            let seeds = (1..=seeds).map(|s| 1000 * (k as u64 + 1) + s);
-            seeds
-                .map(|seed| {
-                    support::render(&scene, "sppm", &settings, &isophote::integrators::Common { seed, ..base.clone() }, iterations).0
-                })
-                .collect()
+            let before = 1000 * (k as u64 + 1);
+            runs_of(&scene, "sppm", &settings, &common(0, DEPTH), iterations, before + 1..=before + seeds)
         })
         .collect();
     let mut places = vec![("image".to_owned(), (0..kept.len()).filter(|&i| kept[i]).collect::<Vec<usize>>())];

@@ -1,13 +1,13 @@
 //! An iteration with chains of light paths: measurement points first, then light that is aimed at them.
 
 use super::super::aimed::{Aimed, look};
-use super::{Counts, Glossy, IterationStats, Sppm};
+use super::{Counts, DENSITY, Glossy, IterationStats, REGION_DENSITY, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
 use crate::samplers::Purpose;
 use crate::targets::LightVertex;
-use crate::targets::deposits::{Deposits, collect};
+use crate::targets::deposits::{Deposits, collect, vertices};
 use crate::transport::walk::Tally;
 
 /// What a row of pixels sees, and how often through smooth lobes alone.
@@ -55,6 +55,16 @@ impl Sppm<'_> {
             let scale = 1.0 / f64::from(at.kernel_size());
             let [r, g, b] = sum.flux.map(|v| (v * scale) as f32);
             values[at.pixel as usize] += at.throughput * Rgb::new(r, g, b);
+        }
+        if let Some(mut readings) = film.take_readings() {
+            let counts = vertices(&draw.batches, &draw.scales, count);
+            for (number, (at, taken)) in points.all().iter().zip(counts).enumerate() {
+                readings.add(DENSITY, at.pixel as usize, taken / f64::from(at.kernel_size()));
+                if let Some(density) = sights.region_density(number) {
+                    readings.add(REGION_DENSITY, at.pixel as usize, density);
+                }
+            }
+            film.keep_readings(readings);
         }
         let width = eye.size.0;
         let sample = |tally: &mut Tally, x: usize, y: usize| tally.finite(values[y * width + x]);

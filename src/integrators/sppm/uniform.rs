@@ -1,6 +1,6 @@
 //! Independent light paths: photons into a grid, then each measurement point gathers and is gone.
 
-use super::{Counts, IterationStats, Sppm};
+use super::{Counts, DENSITY, IterationStats, Sppm};
 use crate::image::film::Film;
 use crate::math::Rgb;
 use crate::photons::radius::shrink;
@@ -12,23 +12,46 @@ use crate::transport::merge::{accepts, merge};
 use crate::transport::walk::Tally;
 use glam::Vec3;
 
+/// What a row of pixels counts, and the densities it reads by pixel, where they are asked for.
+#[derive(Default)]
+struct Row {
+    tally: Tally,
+    counts: Counts,
+    densities: Vec<(usize, f64)>,
+}
+
 impl Sppm<'_> {
     /// An iteration; it depends on its index, settings and seed alone.
     pub(super) fn iterate_uniform(&self, i: u64, film: &mut Film, stats: &mut IterationStats) -> Counts {
         let (photons, scales) = self.shoot(i, stats);
         let radius = self.radius_at(i);
         let width = self.eye.size.0;
-        let sample = |(tally, counts): &mut (Tally, Counts), x: usize, y: usize| {
-            let seen = self.eye.sample((i, Purpose::Camera), y * width + x, radius, tally);
+        let mut readings = film.take_readings();
+        let reads = readings.is_some();
+        // One stratum, in which every path weighs 1.
+        let share: f64 = scales.iter().sum();
+        let sample = |Row { tally, counts, densities }: &mut Row, x: usize, y: usize| {
+            let pixel = y * width + x;
+            let seen = self.eye.sample((i, Purpose::Camera), pixel, radius, tally);
             counts.glossy.see(&seen);
+            let before = counts.deposits;
             let gathered = seen.measured.as_ref().map_or(Rgb::BLACK, |m| self.gather(m, &photons, &scales, &mut counts.deposits));
+            if let Some(m) = seen.measured.as_ref().filter(|_| reads) {
+                densities.push((pixel, (counts.deposits - before) as f64 * share / f64::from(m.kernel_size())));
+            }
             tally.finite(self.emission(&seen) + gathered)
         };
         let mut all = Counts::default();
-        film.add_eye_samples(Default::default, sample, |(tally, counts): (Tally, Counts)| {
-            stats.count(&tally);
-            all.add(&counts);
+        film.add_eye_samples(Default::default, sample, |row: Row| {
+            stats.count(&row.tally);
+            all.add(&row.counts);
+            if let Some(readings) = &mut readings {
+                row.densities.into_iter().for_each(|(pixel, density)| readings.add(DENSITY, pixel, density));
+            }
         });
+        if let Some(readings) = readings {
+            film.keep_readings(readings);
+        }
         all
     }
 

@@ -31,6 +31,7 @@ impl<'a> Iteration<'a, '_> {
         record: &mut R,
     ) -> Rgb {
         let number = y * self.size.0 + x;
+        record.start(number);
         let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stream();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
@@ -60,6 +61,7 @@ impl<'a> Iteration<'a, '_> {
                     }
                 }
                 if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
+                    record.merges_at(&point.end);
                     let found = self.merge(vertex, &point, merging, record);
                     sum += tally.finite(found);
                 }

@@ -28,7 +28,9 @@ pub(super) struct Iteration<'a, 'w> {
     pub(super) depths: DepthRange,
     /// Radius of merges, world units.
     pub(super) radius: f32,
-    /// One over their area and the number of light subpaths.
+    /// Light subpaths an iteration.
+    pub(super) light_paths: f64,
+    /// One over the area of merges and the number of light subpaths.
     pub(super) merge_density: f32,
     /// How much denser light subpaths lie than independent ones, by place; `None` where they are independent.
     pub(super) gain: Option<Gain<'w>>,

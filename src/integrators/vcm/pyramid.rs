@@ -1,5 +1,6 @@
 //! What each technique brings to the paths of each length, with its weight and without: the pyramid of [VEACH 10.2].
 
+use super::density::Joined;
 use super::iteration::Iteration;
 use super::light::{LightSide, Merging};
 use super::technique::Technique;
@@ -7,6 +8,8 @@ use crate::image::film::Film;
 use crate::image::layers::{Layer, LayerSums};
 use crate::integrators::IterationStats;
 use crate::math::Rgb;
+use crate::photons::density::DensityMap;
+use crate::scene::hit::Endpoint;
 use crate::targets::points::DepthRange;
 use crate::transport::mis::Techniques;
 use crate::transport::walk::Tally;
@@ -20,6 +23,12 @@ pub(super) trait Recorder {
     const ON: bool;
     /// A path of so many edges: its value with the technique's weight, and with weight 1.
     fn add(&mut self, edges: u32, technique: Technique, weighted: Rgb, unweighted: Rgb);
+    /// What follows is of this pixel.
+    #[inline(always)]
+    fn start(&mut self, _pixel: usize) {}
+    /// The pixel's subpath has come to a surface where it merges.
+    #[inline(always)]
+    fn merges_at(&mut self, _end: &Endpoint) {}
 }
 
 /// Takes down nothing.
@@ -142,6 +151,9 @@ struct Record<'p> {
 
 impl Recorder for Record<'_> {
     const ON: bool = true;
+    fn start(&mut self, pixel: usize) {
+        (self.pixel, self.first) = (pixel as u32, self.found.len());
+    }
     fn add(&mut self, edges: u32, technique: Technique, weighted: Rgb, unweighted: Rgb) {
         let number = self.pyramid.number(edges, technique);
         let new = Found::new(self.pixel, number, weighted, unweighted, &mut self.tally);
@@ -157,26 +169,24 @@ impl Recorder for Record<'_> {
 
 impl Iteration<'_, '_> {
     /// A camera subpath a pixel, and what it is joined with, into the film.
-    pub(super) fn camera_side(&self, film: &mut Film, light: &LightSide, merging: Option<&Merging>, stats: &mut IterationStats) {
+    pub(super) fn camera_side(
+        &self,
+        film: &mut Film,
+        light: &LightSide,
+        merging: Option<&Merging>,
+        density: Option<&DensityMap>,
+        stats: &mut IterationStats,
+    ) {
+        let joined = Joined { light, merging, density };
         let Some((pyramid, mut layers)) = Pyramid::new(self.techniques, self.depths).zip(film.take_layers()) else {
-            let sample = |tally: &mut Tally, x: usize, y: usize| self.pixel(x, y, light, merging, tally, &mut Nothing);
-            return film.add_eye_samples(Tally::default, sample, |tally| stats.count(&tally));
+            return self.trace_reading(film, &joined, stats, || Nothing, |_, _| {});
         };
         let record = || Record { pyramid: &pyramid, pixel: 0, first: 0, found: Vec::new(), tally: Tally::default() };
-        let sample = |(tally, record): &mut (Tally, Record<'_>), x: usize, y: usize| {
-            (record.pixel, record.first) = ((y * self.size.0 + x) as u32, record.found.len());
-            self.pixel(x, y, light, merging, tally, record)
-        };
         let half = pyramid.half();
-        film.add_eye_samples(
-            || (Tally::default(), record()),
-            sample,
-            |(tally, record)| {
-                record.found.iter().for_each(|found| found.add_to(&mut layers, half));
-                stats.count(&tally);
-                stats.count(&record.tally);
-            },
-        );
+        self.trace_reading(film, &joined, stats, record, |record, stats| {
+            record.found.iter().for_each(|found| found.add_to(&mut layers, half));
+            stats.count(&record.tally);
+        });
         film.keep_layers(layers);
     }
 

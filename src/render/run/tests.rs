@@ -200,7 +200,7 @@ fn methods_with_state_start_at_zero() {
 #[test]
 fn layers_and_previews_are_written() {
     let mut bench = bench(0..4);
-    bench.plan.output.layers = Layers { variance: true, count: true, pyramid: false };
+    bench.plan.output.layers = Layers { variance: true, count: true, ..Layers::default() };
     bench.plan.output.preview = Some((bench.folder.path().join("out.png"), Exposure::FromImage));
     let outcome = bench.run(|_| (), &Interrupt::default());
     let file = exr::read_file(&bench.plan.output.path).expect("an EXR");
