@@ -121,9 +121,6 @@ pub enum MethodError {
         "--aov density shows how densely photons lie, which sppm knows, and vcm with --merge-weights vcm-plus or vcm-star: leave it out"
     )]
     NoDensity,
-    /// The map counts light subpaths as they are drawn.
-    #[error("--aov density of vcm reads a map that counts light subpaths as drawn: give --sampler uniform, or use the method sppm")]
-    DensityAsDrawn,
     /// A pyramid without end.
     #[error("--aov pyramid keeps an image of every technique of every path length: give --max-depth D, at most {most}")]
     PyramidDepth {

@@ -216,13 +216,9 @@ impl Integrator for Engine<'_> {
     }
 
     fn density_images(&self) -> Result<&'static [&'static str], MethodError> {
-        if !(self.techniques.merges && self.heuristic.asks_density()) {
-            return Err(MethodError::NoDensity);
-        }
-        if self.aimed.is_some() {
-            return Err(MethodError::DensityAsDrawn);
-        }
-        Ok(&["density"])
+        // The map counts light subpaths as drawn: settings allow it with independent ones alone.
+        let maps = self.techniques.merges && self.heuristic.asks_density();
+        if maps { Ok(&["density"]) } else { Err(MethodError::NoDensity) }
     }
 
     fn diagnostics(&self) -> Option<Value> {

@@ -73,6 +73,8 @@ fn input_that_is_bad_is_told_with_its_name() {
         (&["render", "bdpt", "lamp/scene.xml", "--aov", "pyramid", "--max-depth", "-1"], &["--aov pyramid", "--max-depth", "16"]),
         (&["render", "vcm", "lamp/scene.xml", "--aov", "pyramid", "--max-depth", "17"], &["--aov pyramid", "--max-depth", "16"]),
         (&["render", "vcm", "lamp/scene.xml", "--aov", "pyramid", "--max-depth", "16", "--max-memory", "1M"], &["--max-memory", "help:"]),
+        (&["render", "path", "lamp/scene.xml", "--aov", "density"], &["--aov density", "sppm", "vcm-plus or vcm-star"]),
+        (&["render", "vcm", "lamp/scene.xml", "--aov", "density"], &["--aov density", "vcm-plus or vcm-star"]),
         (&["compare", "small.exr", "large.exr"], &["large.exr", "3x3", "2x2"]),
         (&["compare", "missing.exr", "small.exr"], &["missing.exr"]),
         (&["compare", "small.exr", "small.exr", "--inset", "1,0,2,1"], &["--inset 1,0,2,1", "2x2"]),

@@ -149,3 +149,33 @@ fn a_pyramid_is_layers_and_a_sheet() {
         assert!(channel(dark).is_none(), "{method}: {dark}");
     }
 }
+
+/// Where densities are asked for they are layers; memory counts them; where they are not known NaN says so.
+#[test]
+fn densities_are_layers() {
+    let bench = Bench::new();
+    let small = ["--resolution", "200x200", "--iterations", "1", "--max-memory", "2500K", "-q"];
+    let told = |more: &[&str]| bench.run(&[&["render", "sppm", SCENE, "-o", "b.exr", "--photons", "100"], &small[..], more].concat());
+    assert!(told(&[]).status.success(), "scene and film alone fit");
+    let refused = told(&["--aov", "density", "--sampler", "spatial"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8(refused.stderr).unwrap().contains("--max-memory"));
+
+    let spatial: &[&str] = &["--sampler", "spatial", "--rest", "never"];
+    let star: &[&str] = &["--merge-weights", "vcm-star"];
+    for (method, options, expected) in
+        [("sppm", &[][..], &["density.Y"][..]), ("sppm", spatial, &["density.Y", "density.region.Y"]), ("vcm", star, &["density.Y"])]
+    {
+        let run = ["render", method, SCENE, "-o", "a.exr", "--iterations", "3", "--aov", "density", "-q"];
+        bench.succeed(&[&run[..], options].concat());
+        let file = bench.read("a.exr");
+        let found: Vec<_> = file.channels.iter().filter(|channel| channel.name.starts_with("density")).collect();
+        assert_eq!(found.iter().map(|channel| channel.name.as_str()).collect::<Vec<_>>(), expected, "{method}");
+        for channel in found {
+            let (lit, unknown) = (channel.samples.iter().any(|v| *v > 0.0), channel.samples.iter().filter(|v| v.is_nan()).count());
+            assert!(lit && unknown > 0 && unknown < channel.samples.len(), "{method}, {}: {unknown} unknown", channel.name);
+        }
+        assert!(bench.succeed(&["info", "a.exr"]).contains("density.Y"));
+        assert!(bench.metadata("a.exr")["settings"].get("density").is_none(), "it changes no image");
+    }
+}

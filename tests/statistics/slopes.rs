@@ -30,19 +30,25 @@ impl Products {
     fn split(&self, drawn: &[usize], point: usize) -> (f64, f64) {
         let n = drawn.len() as f64;
         let square = drawn.iter().map(|&i| self.0[point][i][i]).sum::<f64>() / n;
-        let mean = drawn.iter().flat_map(|&i| drawn.iter().map(move |&j| (i, j))).map(|(i, j)| self.0[point][i][j]).sum::<f64>() / (n * n);
+        let row = |i: usize| drawn.iter().map(|&j| self.0[point][i][j]).sum::<f64>();
+        let mean = drawn.iter().map(|&i| row(i)).sum::<f64>() / (n * n);
         let variance = (square - mean) * n / (n - 1.0);
         (variance, mean - variance / n)
     }
 }
 
-fn noise_and_bias_slope(fake: &Fake, repetition: u64, runs: usize) -> (Option<Slope>, Option<Slope>) {
+/// Slope of one part of the error, made of a point's variance and squared bias.
+fn slope_of(fake: &Fake, repetition: u64, runs: usize, part: impl Fn((f64, f64)) -> f64) -> Option<Slope> {
     let products = Products::of(&fake.runs(repetition, runs));
-    let x = iterations();
-    let fit = |curve: &dyn Fn(&[usize], usize) -> f64| log_log_slope_of(&x, runs, WINDOW, LEVEL, key(repetition), curve);
-    let noise = fit(&|drawn, point| products.split(drawn, point).0.sqrt());
-    let bias = if fake.bias > 0.0 { fit(&|drawn, point| products.split(drawn, point).1.sqrt()) } else { None };
-    (noise, bias)
+    log_log_slope_of(&iterations(), runs, WINDOW, LEVEL, key(repetition), |drawn, point| part(products.split(drawn, point)).sqrt())
+}
+
+fn noise_slope(fake: &Fake, repetition: u64, runs: usize) -> Option<Slope> {
+    slope_of(fake, repetition, runs, |(variance, _)| variance)
+}
+
+fn bias_slope(fake: &Fake, repetition: u64, runs: usize) -> Option<Slope> {
+    slope_of(fake, repetition, runs, |(_, bias2)| bias2)
 }
 
 fn of_slope(slope: Option<Slope>) -> (f64, Option<Interval>) {
@@ -56,12 +62,12 @@ fn error_coverage(name: &str, fake: &Fake, runs: usize, repetitions: u64) -> Cov
 }
 
 fn noise_coverage(name: &str, fake: &Fake, runs: usize, repetitions: u64) -> Coverage {
-    let study = |r| of_slope(noise_and_bias_slope(&Fake { bias: 0.0, ..*fake }, r, runs).0);
+    let study = |r| of_slope(noise_slope(&Fake { bias: 0.0, ..*fake }, r, runs));
     Coverage::of(format!("slope of the noise, {name}, {runs} runs"), fake.noise_slope, repetitions, study)
 }
 
 fn bias_coverage(name: &str, fake: &Fake, runs: usize, repetitions: u64) -> Coverage {
-    let study = |r| of_slope(noise_and_bias_slope(fake, r, runs).1);
+    let study = |r| of_slope(bias_slope(fake, r, runs));
     Coverage::of(format!("slope of the bias, {name}, {runs} runs"), fake.bias_slope, repetitions, study)
 }
 
@@ -89,7 +95,7 @@ fn error_slopes_are_recovered_and_covered() {
 fn one_study_finds_noise_and_bias_within_a_twentieth() {
     for alpha in [2.0 / 3.0, 0.75] {
         let fake = progressive(3, alpha);
-        let (noise, bias) = noise_and_bias_slope(&fake, 0, 16);
+        let (noise, bias) = (noise_slope(&fake, 0, 16), bias_slope(&fake, 0, 16));
         for (fit, planted) in [(noise.unwrap(), fake.noise_slope), (bias.unwrap(), fake.bias_slope)] {
             assert!((fit.slope - planted).abs() < 0.05, "alpha {alpha}: {fit:?}, planted {planted}");
             assert!(fit.interval.unwrap().contains(planted), "alpha {alpha}: {fit:?}, planted {planted}");

@@ -1,6 +1,7 @@
 //! Whole methods on scenes whose answer is known.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod density;
 #[path = "../support/mod.rs"]
 mod support;
 
