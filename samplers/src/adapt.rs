@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Bounds of the step size `d` of `xi^(1/d + 1)`: at the upper one a step has a mean length of a third of the unit interval in every
-/// coordinate, and nothing larger is worth having; at the lower one hardly a proposal leaves its 2^-32.
+/// Bounds of the step size `d`: at the upper one a step has a mean length of a quarter of the unit interval in every
+/// coordinate, and nothing larger is worth having; below the lower one the finer sizes would leave a path where it is.
 pub(crate) const BOUNDS: (f64, f64) = (1e-4, 1.0);
 
 /// The step size of one chain. After its `n`-th mutation `d += (accepted/n - wanted)/n` \[HACHISUKA11\]: the gain dies out as 1/n,
@@ -27,10 +27,10 @@ impl StepSize {
         self.d
     }
 
-    /// `2^octave/d + 1`: the exponent of a step `octave` octaves finer than `d`.
+    /// `d 4^-fineness`.
     #[inline(always)]
-    pub(crate) fn exponent(&self, octave: usize) -> f32 {
-        (1u32 << octave) as f32 / self.d as f32 + 1.0
+    pub(crate) fn finer(&self, fineness: usize) -> f32 {
+        self.d as f32 / (1u32 << (2 * fineness)) as f32
     }
 
     /// Learns from one mutation.
@@ -59,7 +59,7 @@ mod tests {
         let mut late = 0u32;
         const STEPS: u32 = 400_000;
         for i in 0..STEPS {
-            mutate_all(&x, step.exponent(0), &mut random, &mut y);
+            mutate_all(&x, step.finer(0), &mut random, &mut y);
             let accepted = random.chance() < (log(&y) - log(&x)).exp();
             if accepted {
                 std::mem::swap(&mut x, &mut y);
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn acceptance_converges_to_what_is_wanted() {
-        for (width, dimensions) in [(0.02, 1), (0.02, 2), (0.05, 5), (0.01, 20)] {
+        for (width, dimensions) in [(0.001, 1), (0.02, 2), (0.05, 5), (0.01, 20)] {
             for wanted in [0.234, 0.5] {
                 for start in [1.0, 0.02] {
                     let (d, acceptance) = on_a_bump(width, dimensions, wanted, start);
@@ -81,6 +81,13 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Where the largest steps are accepted more often than wanted, they stay the largest.
+    #[test]
+    fn on_a_wide_bump_the_size_is_the_largest() {
+        let (d, acceptance) = on_a_bump(0.1, 1, 0.234, 0.02);
+        assert!(d == BOUNDS.1 && acceptance > 0.3, "{acceptance}, d {d}");
     }
 
     #[test]

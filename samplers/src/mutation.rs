@@ -1,52 +1,40 @@
 //! The mutation of one coordinate, and streams that mutate a stored state on demand.
 //!
-//! A coordinate is a 32-bit integer, `u = x / 2^32`; a path sees its upper 24 bits. The walk `u' = u +- xi^(1/d + 1)` modulo 1
-//! \[HACHISUKA11\] is then a wrapping addition or subtraction of an integer that does not depend on `x`, with a fair sign. That is symmetric
+//! A coordinate is a 32-bit integer, `u = x / 2^32`; a path sees its upper 24 bits. The walk is `u' = u +- size xi^3` modulo 1, one size for
+//! all coordinates of a proposal. \[HACHISUKA11\] takes `xi^(1/d + 1)` instead, whose small sizes come from the power: there hardly any proposal
+//! moves all coordinates by about as little, since some go far in nearly every one and spoil it. The step is an integer that does not
+//! depend on `x`, with a fair sign, added or subtracted with wrapping. That is symmetric
 //! and keeps the uniform law on the 2^32 integers *exactly*: nothing is rounded, nothing can become 1, and a coordinate lives on the same
-//! grid whether it was drawn afresh or mutated, so that exchanges with the uniform rung are exact as well. The power needs no accuracy for
-//! that; it is a polynomial approximation good to 1e-3 for exponents up to 3.
+//! grid whether it was drawn afresh or mutated, so that exchanges with the uniform rung are exact as well.
 //!
 //! A state holds the coordinates its path used, no more. The target does not depend on the rest, whose law given the used ones is uniform;
 //! so they are drawn afresh for every proposal, which is a Gibbs step and exact \[KELEMEN02\]. No bookkeeping of missed mutations is needed.
 
 use crate::stream::{Stream, UniformStream, unit};
 
-/// `2^32 xi^exponent` to 31 bits, where `xi` is made of the upper 24 of 32 random bits; the last bit of the step is a random one. Written
-/// with conversions and arithmetic alone, so that a loop over it becomes vector instructions on any machine.
+/// `2^32 size xi^3` to 31 bits, where `xi` is made of the upper 24 of 32 random bits; the last bit of the step is a random one. Written
+/// with conversions and multiplications alone, so that a loop over it becomes vector instructions on any machine.
 #[inline(always)]
-fn step(bits: u32, exponent: f32) -> u32 {
-    let xi = (bits >> 8) as i32 as f32 + 0.5;
-    // log2(xi): the exponent of the float, and a polynomial for its mantissa that is exact at both ends.
-    let raw = xi.to_bits();
-    let x = f32::from_bits((raw & 0x007f_ffff) | 0x3f80_0000) - 1.0;
-    let log = (raw >> 23) as i32 as f32 - (127.0 + 24.0) + x * (1.0 + (x - 1.0) * (-0.438_379_32 + x * (0.237_501_32 - x * 0.080_653_16)));
-    // 2^y: adding a large number leaves the nearest integer in the lowest bits. Below -2 the result is 0 anyway.
-    let y = exponent * log + 31.0;
-    let y = if y > -2.0 { y } else { -2.0 };
-    let shifted = y + ROUNDING;
-    let f = y - (shifted - ROUNDING);
-    let power = 0.999_928_95 + f * (0.693_276_2 + f * (0.242_604_05 + f * 0.055_088_684));
-    let scale = f32::from_bits((shifted.to_bits().wrapping_sub(ROUNDING.to_bits()).wrapping_add(127)) << 23);
-    ((power * scale) as i32 as u32) << 1 | (bits >> 1 & 1)
+fn step(bits: u32, size: f32) -> u32 {
+    let xi = ((bits >> 8) as i32 as f32 + 0.5) * (1.0 / 16_777_216.0);
+    // Below 2^31 even for the largest `xi`, which is less than 1.
+    ((xi * xi * xi * (size * 2_147_483_520.0)) as i32 as u32) << 1 | (bits >> 1 & 1)
 }
-
-/// `1.5 * 2^23`: floats of this size have the integers for a grid.
-const ROUNDING: f32 = 12_582_912.0;
 
 /// The coordinate after its mutation. The lowest bit gives the sign.
 #[inline(always)]
-fn mutate(x: u32, bits: u32, exponent: f32) -> u32 {
-    let step = step(bits, exponent);
+fn mutate(x: u32, bits: u32, size: f32) -> u32 {
+    let step = step(bits, size);
     if bits & 1 == 0 { x.wrapping_add(step) } else { x.wrapping_sub(step) }
 }
 
-/// Replaces `made` by mutations of all of `base` with exponent `1/d + 1`.
+/// Replaces `made` by mutations of all of `base`, of a size in (0, 1].
 #[inline]
-pub(crate) fn mutate_all(base: &[u32], exponent: f32, random: &mut UniformStream, made: &mut Vec<u32>) {
+pub(crate) fn mutate_all(base: &[u32], size: f32, random: &mut UniformStream, made: &mut Vec<u32>) {
     made.clear();
     made.extend(base.iter().map(|_| random.bits()));
     for (made, x) in made.iter_mut().zip(base) {
-        *made = mutate(*x, *made, exponent);
+        *made = mutate(*x, *made, size);
     }
 }
 
@@ -111,15 +99,15 @@ mod tests {
     fn every_step_has_its_inverse() {
         let mut random = random(0);
         for x in [0, 1, 255, 1 << 31, u32::MAX - 1, u32::MAX] {
-            for exponent in [2.0, 2.5, 11.0, 1e4] {
+            for size in [1.0, 0.3, 1e-2, 1e-8] {
                 for _ in 0..20_000 {
                     let bits = random.bits();
-                    assert_eq!(mutate(mutate(x, bits, exponent), bits ^ 1, exponent), x);
+                    assert_eq!(mutate(mutate(x, bits, size), bits ^ 1, size), x);
                 }
                 // The largest step there is, which is as good as exactly 1.0, and the smallest.
                 for bits in [0, 1, u32::MAX, u32::MAX - 1] {
-                    let y = mutate(x, bits, exponent);
-                    assert_eq!(mutate(y, bits ^ 1, exponent), x);
+                    let y = mutate(x, bits, size);
+                    assert_eq!(mutate(y, bits ^ 1, size), x);
                     assert!((0.0..1.0).contains(&unit(y)));
                 }
             }
@@ -130,12 +118,12 @@ mod tests {
     #[test]
     fn steps_to_both_sides_are_as_likely() {
         const BINS: usize = 32;
-        for (k, exponent) in [2.0f32, 3.5, 21.0].into_iter().enumerate() {
+        for (k, size) in [1.0f32, 0.2, 1e-4].into_iter().enumerate() {
             let mut random = random(10 + k as u64);
             let mut counts = [[0u64; 2]; BINS];
             for _ in 0..1_000_000 {
                 let x = random.bits();
-                let mut step = unit(mutate(x, random.bits(), exponent)) - unit(x);
+                let mut step = unit(mutate(x, random.bits(), size)) - unit(x);
                 step -= step.round();
                 if step != 0.0 {
                     let bin = ((-step.abs().log2()) * 1.3) as usize;
@@ -144,7 +132,7 @@ mod tests {
             }
             for (bin, [left, right]) in counts.into_iter().enumerate().filter(|(_, [a, b])| a + b > 0) {
                 let p = Binomial::new(0.5, left + right).unwrap().cdf(left.min(right));
-                assert!(2.0 * p > 1e-3 / (3 * BINS) as f64, "exponent {exponent}, bin {bin}: {left} left, {right} right");
+                assert!(2.0 * p > 1e-3 / (3 * BINS) as f64, "size {size}, bin {bin}: {left} left, {right} right");
             }
         }
     }
@@ -152,7 +140,7 @@ mod tests {
     /// Uniform coordinates stay uniform after a million mutations, near the borders as well (bins are finest there).
     #[test]
     fn the_uniform_law_is_kept() {
-        for (k, exponent) in [2.0f32, 4.0, 101.0].into_iter().enumerate() {
+        for (k, size) in [1.0f32, 0.2, 1e-3].into_iter().enumerate() {
             let mut random = random(20 + k as u64);
             let mut x = vec![0u32; 1000];
             x.iter_mut().for_each(|x| *x = random.bits());
@@ -160,10 +148,10 @@ mod tests {
             let edges = [2e-4f32, 1.0 - 2e-4];
             for round in 0..1000 {
                 for x in &mut x {
-                    *x = mutate(*x, random.bits(), exponent);
+                    *x = mutate(*x, random.bits(), size);
                 }
-                // Thinned: neighbouring rounds are not independent, and the small exponent forgets in ten.
-                if round % 100 == 99 && exponent < 50.0 || round == 999 {
+                // Thinned: neighbouring rounds are not independent, and large steps forget in ten to a hundred.
+                if round % 100 == 99 && size > 0.01 || round == 999 {
                     for u in x.iter().map(|x| unit(*x)) {
                         counts[if u < edges[0] {
                             64
@@ -182,22 +170,19 @@ mod tests {
             terms.push(((counts[64] + counts[65]) as f64, 2.0 * expected(64)));
             let chi2: f64 = terms.iter().map(|(c, e)| (c - e).powi(2) / e).sum();
             let p = ChiSquared::new(64.0).unwrap().sf(chi2);
-            assert!(p > 1e-3 / 3.0, "exponent {exponent}: chi2 {chi2}, p {p}");
+            assert!(p > 1e-3 / 3.0, "size {size}: chi2 {chi2}, p {p}");
         }
     }
 
-    /// The approximated power is the power: 1e-3 relative where the result has that many digits.
+    /// The integer step is `size xi^3` to the digits of a float, or of the integer where it has fewer, and never wraps.
     #[test]
-    fn the_step_is_the_power_it_stands_for() {
-        for exponent in [1.5f32, 2.0, 3.0] {
-            for bits in (0..u32::MAX).step_by(65_537) {
+    fn the_step_is_what_it_stands_for() {
+        for size in [1.0f32, 0.37, 1e-3, 1e-7] {
+            for bits in (0..u32::MAX).step_by(65_537).chain([u32::MAX]) {
                 let xi = (f64::from(bits >> 8) + 0.5) / 16_777_216.0;
-                let exact = xi.powf(f64::from(exponent)) * 4_294_967_296.0;
-                assert!(
-                    (f64::from(step(bits, exponent)) - exact).abs() <= 1e-3 * exact + 2.0,
-                    "{bits}: {} for {exact}",
-                    step(bits, exponent)
-                );
+                let exact = xi.powi(3) * f64::from(size) * 4_294_967_296.0;
+                let made = f64::from(step(bits, size));
+                assert!((made - exact).abs() <= 1e-6 * exact + 2.0, "{bits}, size {size}: {made} for {exact}");
             }
         }
     }

@@ -26,8 +26,8 @@ use crate::sampler::{CELLS, Drawn, LightPathSpace};
 use crate::state::{Chain, Life, State};
 use crate::stream::{Key, Purpose, UniformStream};
 
-/// Sizes of small steps, each half of the one before.
-const OCTAVES: usize = 7;
+/// Sizes of small steps, each a quarter of the one before: down to a 4096th, since a target may be far narrower in some places than in others.
+const SIZES: usize = 7;
 
 /// Steps of a slice.
 const SLICE: u64 = 512;
@@ -248,8 +248,8 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
         match how {
             Proposal::Independent => {}
             Proposal::Small => {
-                let exponent = self.sizes[rung - 1].0.exponent(self.random.below(OCTAVES));
-                mutate_all(&self.states[rung - 1].coordinates, exponent, &mut self.random, made);
+                let size = self.sizes[rung - 1].0.finer(self.random.below(SIZES));
+                mutate_all(&self.states[rung - 1].coordinates, size, &mut self.random, made);
             }
             Proposal::End => {
                 let kept = &self.states[rung - 1].coordinates;
