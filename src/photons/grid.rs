@@ -5,6 +5,7 @@
 use super::cells::{Cells, NEAR, end_of_row};
 use super::sort::sort;
 use crate::math::eight::{Vec3x8, bits};
+use crate::math::fetch;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 use wide::f32x8;
@@ -46,6 +47,29 @@ pub struct Grid {
     /// Bucket `b` holds the places `starts[b]..starts[b + 1]`.
     starts: Vec<u32>,
     cells: Cells,
+}
+
+/// Widest range of cells along an axis of a query that is prepared run by run, and the most runs that it can have: as the range is
+/// narrower than a region, a row is two of them at most.
+const SHORT: i32 = 2;
+const RUNS: usize = 8;
+/// Vectors of positions that are asked for ahead in each run.
+const FETCHED: usize = 4;
+/// Places found that are kept before they are visited.
+const HELD: usize = 32;
+
+/// A query under way, so that the memory it needs can be asked for before it is used: [`Grid::search`], [`Grid::approach`], [`Grid::finish`].
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    from: Vec3,
+    radius2: f32,
+    low: IVec3,
+    high: IVec3,
+    /// First and last bucket of each run; after [`Grid::approach`] where its places begin and end.
+    runs: [(u32, u32); RUNS],
+    count: usize,
+    /// Too wide to list its runs.
+    wide: bool,
 }
 
 impl Grid {
@@ -95,28 +119,97 @@ impl Grid {
     /// Calls `visit` with the place of every position closer than `radius` to `p` and its squared distance, each exactly once, in an order
     /// that depends on the positions and the cells' side alone. Allocates nothing.
     #[inline]
-    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(usize, f32)) {
+    pub fn query(&self, p: Vec3, radius: f32, visit: impl FnMut(usize, f32)) {
+        let mut search = self.search(p, radius);
+        self.approach(&mut search);
+        self.finish(&search, |_| (), visit);
+    }
+
+    /// Begins a query: asks for the memory that says where the runs lie. There is other work to be done while it comes.
+    #[inline(always)]
+    pub fn search(&self, p: Vec3, radius: f32) -> Search {
         // Differences, squares, sums and floors round monotonically: what rounding finds closer than the radius, it finds inside this box too.
         let reach = Vec3::splat(radius);
         let (low, high) = (self.cells.of(p - reach), self.cells.of(p + reach));
-        let (from, radius2) = (Vec3x8::splat(p), f32x8::splat(radius * radius));
-        if high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all() {
-            self.each_run(low, high, |_, run| self.visit_run(run, from, radius2, &mut visit));
-        } else {
-            self.each_run(low, high, |[first, last], run| {
-                self.visit_run(run, from, radius2, &mut |place, distance2| {
-                    let cell = self.cells.of(self.position(place));
-                    if cell.cmpge(first).all() && cell.cmple(last).all() {
-                        visit(place, distance2);
-                    }
-                });
+        let mut search = Search { from: p, radius2: radius * radius, low, high, runs: [(0, 0); RUNS], count: 0, wide: true };
+        if high.wrapping_sub(low).cmplt(IVec3::splat(SHORT)).all() {
+            search.wide = false;
+            self.each_run(low, high, |_, buckets| {
+                fetch(&self.starts[buckets.0 as usize]);
+                search.runs[search.count & (RUNS - 1)] = buckets;
+                search.count += 1;
             });
+        }
+        search
+    }
+
+    /// Goes on with a query: asks for the positions in its runs, which takes time again.
+    #[inline(always)]
+    pub fn approach(&self, search: &mut Search) {
+        for run in &mut search.runs[..search.count & (2 * RUNS - 1)] {
+            *run = self.places(*run);
+            let (start, end) = *run;
+            let lanes = self.lanes.get(start as usize / 8..(end as usize).div_ceil(8).max(start as usize / 8)).unwrap_or_default();
+            for eight in lanes.iter().take(FETCHED) {
+                fetch(eight);
+                fetch(&eight.z);
+            }
         }
     }
 
-    /// The cells from `low` to `high`, run by run: the first and the last cell, and where their places begin and end.
+    /// The places of the buckets from the first to the last.
     #[inline(always)]
-    fn each_run(&self, low: IVec3, high: IVec3, mut of_run: impl FnMut([IVec3; 2], (usize, usize))) {
+    fn places(&self, (first, last): (u32, u32)) -> (u32, u32) {
+        (self.starts[first as usize], self.starts[last as usize + 1])
+    }
+
+    /// Ends a query that [`Grid::approach`] has seen: calls `found` with the places of some positions, then `visit` with these and their squared
+    /// distances, and so on until all are visited; otherwise as [`Grid::query`].
+    #[inline(always)]
+    pub fn finish(&self, search: &Search, found: impl Fn(usize), mut visit: impl FnMut(usize, f32)) {
+        let (from, radius2) = (Vec3x8::splat(search.from), f32x8::splat(search.radius2));
+        if search.wide {
+            return self.query_wide(search, visit);
+        }
+        let mut places = [(0u32, 0.0f32); HELD];
+        let mut count = 0;
+        for &(start, end) in &search.runs[..search.count & (2 * RUNS - 1)] {
+            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, distance2| {
+                found(place);
+                places[count & (HELD - 1)] = (place as u32, distance2);
+                count += 1;
+                if count == HELD {
+                    places.iter().for_each(|&(place, distance2)| visit(place as usize, distance2));
+                    count = 0;
+                }
+            });
+        }
+        places[..count & (HELD - 1)].iter().for_each(|&(place, distance2)| visit(place as usize, distance2));
+    }
+
+    /// A query that touches many cells: far ones may share a bucket, and a position counts for the row it lies in alone.
+    #[inline(never)]
+    fn query_wide(&self, search: &Search, mut visit: impl FnMut(usize, f32)) {
+        let &Search { from, radius2, low, high, .. } = search;
+        let (from, radius2) = (Vec3x8::splat(from), f32x8::splat(radius2));
+        let near = high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all();
+        self.each_run(low, high, |[first, last], buckets| {
+            let (start, end) = self.places(buckets);
+            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, distance2| {
+                let within = || {
+                    let cell = self.cells.of(self.position(place));
+                    cell.cmpge(first).all() && cell.cmple(last).all()
+                };
+                if near || within() {
+                    visit(place, distance2);
+                }
+            });
+        });
+    }
+
+    /// The cells from `low` to `high`, run by run: the first and the last cell, and their buckets.
+    #[inline(always)]
+    fn each_run(&self, low: IVec3, high: IVec3, mut of_run: impl FnMut([IVec3; 2], (u32, u32))) {
         let mut z = low.z;
         loop {
             let mut y = low.y;
@@ -125,9 +218,8 @@ impl Grid {
                 let mut x = low.x;
                 loop {
                     let last = end_of_row(x).min(high.x);
-                    let bucket = row.bucket(x) as usize;
-                    let run = (self.starts[bucket] as usize, self.starts[bucket + (last - x) as usize + 1] as usize);
-                    of_run([IVec3::new(x, y, z), IVec3::new(last, y, z)], run);
+                    let bucket = row.bucket(x);
+                    of_run([IVec3::new(x, y, z), IVec3::new(last, y, z)], (bucket, bucket + (last - x) as u32));
                     if last >= high.x {
                         break;
                     }

@@ -1,7 +1,7 @@
 //! What light left at surfaces, in the order of a grid.
 
-use super::grid::Grid;
-use crate::math::Rgb;
+use super::grid::{Grid, Search};
+use crate::math::{Rgb, fetch};
 use glam::Vec3;
 
 /// A photon but for its position: flux that arrived at a surface point.
@@ -47,7 +47,15 @@ impl<T> Store<T> {
 
     /// Calls `visit` with every item closer than `radius` to `p` and its squared distance: see [`Grid::query`].
     #[inline]
-    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(&T, f32)) {
-        self.grid.query(p, radius, |place, distance2| visit(&self.items[place], distance2));
+    pub fn query(&self, p: Vec3, radius: f32, visit: impl FnMut(&T, f32)) {
+        let mut search = self.grid.search(p, radius);
+        self.grid.approach(&mut search);
+        self.finish(&search, visit);
+    }
+
+    /// [`Grid::finish`] with the items.
+    #[inline(always)]
+    pub fn finish(&self, search: &Search, mut visit: impl FnMut(&T, f32)) {
+        self.grid.finish(search, |place| fetch(&self.items[place]), |place, distance2| visit(&self.items[place], distance2));
     }
 }

@@ -5,6 +5,7 @@ use super::light::{LightSide, LightVertex, Merging};
 use super::pyramid::Recorder;
 use super::technique::Technique;
 use crate::math::Rgb;
+use crate::photons::Search;
 use crate::samplers::{Key, Purpose, Stream};
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraRay;
@@ -49,9 +50,17 @@ impl<'a> Iteration<'a, '_> {
             }
             let goes_on = vertex.carried.edges < self.depths.max;
             if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
+                // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
+                let merging = merging.filter(|_| vertex.carried.share > 0.0);
+                let mut search = merging.map(|merging| merging.store.grid().search(point.end.p, self.radius));
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
+                }
+                if let Some((merging, search)) = merging.zip(search.as_mut()) {
+                    merging.store.grid().approach(search);
+                }
+                if self.techniques.connections {
                     if let Some(partner) = &partner {
                         for (end, letters) in partner.vertices() {
                             let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
@@ -59,8 +68,8 @@ impl<'a> Iteration<'a, '_> {
                         }
                     }
                 }
-                if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
-                    let found = self.merge(vertex, &point, merging, record);
+                if let Some((merging, search)) = merging.zip(search) {
+                    let found = self.merge(vertex, &point, (merging, &search), record);
                     sum += tally.finite(found);
                 }
             }
@@ -207,11 +216,17 @@ impl<'a> Iteration<'a, '_> {
         )
     }
 
-    /// Merges with the light vertices around.
-    fn merge<R: Recorder>(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging, record: &mut R) -> Rgb {
+    /// Merges with the light vertices around, whose search has been prepared.
+    fn merge<R: Recorder>(
+        &self,
+        vertex: &SubpathVertex<'a>,
+        point: &SurfacePoint<'a>,
+        (merging, search): (&Merging, &Search),
+        record: &mut R,
+    ) -> Rgb {
         let mut sum = Rgb::BLACK;
         let (n_g, n_s) = (point.end.n_g, point.frame.n);
-        merging.store.query(point.end.p, self.radius, |photon, _| {
+        merging.store.finish(search, |photon, _| {
             let carried = photon.carried();
             let edges = vertex.carried.edges + carried.edges;
             if !self.depths.contains(edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
