@@ -10,6 +10,9 @@ use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 use wide::f32x8;
 
+/// So many items before its turn an item's memory is asked for.
+const AHEAD: usize = 16;
+
 /// Which item stands at each place of a grid.
 #[derive(Clone, Debug, Default)]
 pub struct Order(Vec<u32>);
@@ -32,7 +35,18 @@ impl Order {
 
     /// What belongs to the items, place by place; `item` is asked once for the number of each.
     pub fn gather<T: Send>(&self, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        self.0.par_iter().with_min_len(1 << 12).map(|&i| item(i as usize)).collect()
+        self.gather_ahead(|_| (), item)
+    }
+
+    /// [`Order::gather`]; `ahead` is told of each number before its turn, to ask for the memory: items lie anywhere.
+    pub fn gather_ahead<T: Send>(&self, ahead: impl Fn(usize) + Sync, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let one = |(place, &i): (usize, &u32)| {
+            if let Some(&later) = self.0.get(place + AHEAD) {
+                ahead(later as usize);
+            }
+            item(i as usize)
+        };
+        self.0.par_iter().with_min_len(1 << 12).enumerate().map(one).collect()
     }
 }
 
@@ -55,19 +69,21 @@ const SHORT: i32 = 2;
 const RUNS: usize = 8;
 /// Vectors of positions that are asked for ahead in each run.
 const FETCHED: usize = 4;
-/// Places found that are kept before they are visited.
+/// Places found that there is room for.
 const HELD: usize = 32;
 
-/// A query under way, so that the memory it needs can be asked for before it is used: [`Grid::search`], [`Grid::approach`], [`Grid::finish`].
+/// A query in steps, so that the memory of each can be asked for while there is other work: [`Grid::search`], [`Grid::approach`],
+/// [`Grid::find`], [`Grid::visit`].
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     from: Vec3,
-    radius2: f32,
-    low: IVec3,
-    high: IVec3,
+    radius: f32,
     /// First and last bucket of each run; after [`Grid::approach`] where its places begin and end.
     runs: [(u32, u32); RUNS],
     count: usize,
+    /// Places found, as many as there is room for, and how many there are.
+    places: [u32; HELD],
+    found: usize,
     /// Too wide to list its runs.
     wide: bool,
 }
@@ -119,19 +135,36 @@ impl Grid {
     /// Calls `visit` with the place of every position closer than `radius` to `p` and its squared distance, each exactly once, in an order
     /// that depends on the positions and the cells' side alone. Allocates nothing.
     #[inline]
-    pub fn query(&self, p: Vec3, radius: f32, visit: impl FnMut(usize, f32)) {
-        let mut search = self.search(p, radius);
-        self.approach(&mut search);
-        self.finish(&search, |_| (), visit);
+    pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(usize, f32)) {
+        let (low, high) = self.box_of(p, radius);
+        let (from, radius2) = (Vec3x8::splat(p), f32x8::splat(radius * radius));
+        if high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all() {
+            self.each_run(low, high, |_, buckets| self.visit_run(self.places(buckets), from, radius2, &mut visit));
+        } else {
+            self.each_run(low, high, |[first, last], buckets| {
+                self.visit_run(self.places(buckets), from, radius2, &mut |place, distance2| {
+                    let cell = self.cells.of(self.position(place));
+                    if cell.cmpge(first).all() && cell.cmple(last).all() {
+                        visit(place, distance2);
+                    }
+                });
+            });
+        }
     }
 
-    /// Begins a query: asks for the memory that says where the runs lie. There is other work to be done while it comes.
+    /// The first and the last cell along each axis that a query touches.
     #[inline(always)]
-    pub fn search(&self, p: Vec3, radius: f32) -> Search {
+    fn box_of(&self, p: Vec3, radius: f32) -> (IVec3, IVec3) {
         // Differences, squares, sums and floors round monotonically: what rounding finds closer than the radius, it finds inside this box too.
         let reach = Vec3::splat(radius);
-        let (low, high) = (self.cells.of(p - reach), self.cells.of(p + reach));
-        let mut search = Search { from: p, radius2: radius * radius, low, high, runs: [(0, 0); RUNS], count: 0, wide: true };
+        (self.cells.of(p - reach), self.cells.of(p + reach))
+    }
+
+    /// Begins a query in steps: asks for the memory that says where the runs lie.
+    #[inline(always)]
+    pub fn search(&self, p: Vec3, radius: f32) -> Search {
+        let (low, high) = self.box_of(p, radius);
+        let mut search = Search { from: p, radius, runs: [(0, 0); RUNS], count: 0, places: [0; HELD], found: 0, wide: true };
         if high.wrapping_sub(low).cmplt(IVec3::splat(SHORT)).all() {
             search.wide = false;
             self.each_run(low, high, |_, buckets| {
@@ -143,13 +176,14 @@ impl Grid {
         search
     }
 
-    /// Goes on with a query: asks for the positions in its runs, which takes time again.
+    /// The second step: asks for the positions in the runs.
     #[inline(always)]
     pub fn approach(&self, search: &mut Search) {
         for run in &mut search.runs[..search.count & (2 * RUNS - 1)] {
-            *run = self.places(*run);
-            let (start, end) = *run;
-            let lanes = self.lanes.get(start as usize / 8..(end as usize).div_ceil(8).max(start as usize / 8)).unwrap_or_default();
+            let (start, end) = self.places(*run);
+            *run = (start as u32, end as u32);
+            // None where the run is empty.
+            let lanes = self.lanes.get(start / 8..end.div_ceil(8)).unwrap_or_default();
             for eight in lanes.iter().take(FETCHED) {
                 fetch(eight);
                 fetch(&eight.z);
@@ -159,52 +193,32 @@ impl Grid {
 
     /// The places of the buckets from the first to the last.
     #[inline(always)]
-    fn places(&self, (first, last): (u32, u32)) -> (u32, u32) {
-        (self.starts[first as usize], self.starts[last as usize + 1])
+    fn places(&self, (first, last): (u32, u32)) -> (usize, usize) {
+        (self.starts[first as usize] as usize, self.starts[last as usize + 1] as usize)
     }
 
-    /// Ends a query that [`Grid::approach`] has seen: calls `found` with the places of some positions, then `visit` with these and their squared
-    /// distances, and so on until all are visited; otherwise as [`Grid::query`].
+    /// The third step, after [`Grid::approach`]: finds the positions, and calls `found` with the place of each.
     #[inline(always)]
-    pub fn finish(&self, search: &Search, found: impl Fn(usize), mut visit: impl FnMut(usize, f32)) {
-        let (from, radius2) = (Vec3x8::splat(search.from), f32x8::splat(search.radius2));
-        if search.wide {
-            return self.query_wide(search, visit);
-        }
-        let mut places = [(0u32, 0.0f32); HELD];
-        let mut count = 0;
+    pub fn find(&self, search: &mut Search, found: impl Fn(usize)) {
+        let (from, radius2) = (Vec3x8::splat(search.from), f32x8::splat(search.radius * search.radius));
+        let (held, mut count) = (&mut search.places, 0);
         for &(start, end) in &search.runs[..search.count & (2 * RUNS - 1)] {
-            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, distance2| {
+            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, _| {
                 found(place);
-                places[count & (HELD - 1)] = (place as u32, distance2);
+                held[count & (HELD - 1)] = place as u32;
                 count += 1;
-                if count == HELD {
-                    places.iter().for_each(|&(place, distance2)| visit(place as usize, distance2));
-                    count = 0;
-                }
             });
         }
-        places[..count & (HELD - 1)].iter().for_each(|&(place, distance2)| visit(place as usize, distance2));
+        search.found = count;
     }
 
-    /// A query that touches many cells: far ones may share a bucket, and a position counts for the row it lies in alone.
-    #[inline(never)]
-    fn query_wide(&self, search: &Search, mut visit: impl FnMut(usize, f32)) {
-        let &Search { from, radius2, low, high, .. } = search;
-        let (from, radius2) = (Vec3x8::splat(from), f32x8::splat(radius2));
-        let near = high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all();
-        self.each_run(low, high, |[first, last], buckets| {
-            let (start, end) = self.places(buckets);
-            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, distance2| {
-                let within = || {
-                    let cell = self.cells.of(self.position(place));
-                    cell.cmpge(first).all() && cell.cmple(last).all()
-                };
-                if near || within() {
-                    visit(place, distance2);
-                }
-            });
-        });
+    /// The last step: calls `visit` with the places that [`Grid::find`] found, the same as [`Grid::query`] and in the same order.
+    #[inline(always)]
+    pub fn visit(&self, search: &Search, mut visit: impl FnMut(usize)) {
+        if search.wide || search.found > HELD {
+            return self.query(search.from, search.radius, |place, _| visit(place));
+        }
+        search.places[..search.found & (2 * HELD - 1)].iter().for_each(|&place| visit(place as usize));
     }
 
     /// The cells from `low` to `high`, run by run: the first and the last cell, and their buckets.

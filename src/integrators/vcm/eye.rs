@@ -60,14 +60,16 @@ impl<'a> Iteration<'a, '_> {
                 if let Some((merging, search)) = merging.zip(search.as_mut()) {
                     merging.store.grid().approach(search);
                 }
-                if self.techniques.connections {
-                    if let Some(partner) = &partner {
-                        for (end, letters) in partner.vertices() {
-                            let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
-                            sum += tally.finite(found);
-                        }
+                let mut sought = merging.zip(search.as_mut());
+                let mut find = || sought.take().map(|(merging, search)| merging.store.find(search));
+                if let Some(partner) = &partner {
+                    for (end, letters) in partner.vertices() {
+                        let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
+                        sum += tally.finite(found);
+                        find();
                     }
                 }
+                find();
                 if let Some((merging, search)) = merging.zip(search) {
                     let found = self.merge(vertex, &point, (merging, &search), record);
                     sum += tally.finite(found);
@@ -226,7 +228,7 @@ impl<'a> Iteration<'a, '_> {
     ) -> Rgb {
         let mut sum = Rgb::BLACK;
         let (n_g, n_s) = (point.end.n_g, point.frame.n);
-        merging.store.finish(search, |photon, _| {
+        merging.store.visit(search, |photon| {
             let carried = photon.carried();
             let edges = vertex.carried.edges + carried.edges;
             if !self.depths.contains(edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {
