@@ -63,8 +63,10 @@ pub struct Grid {
     cells: Cells,
 }
 
-/// Widest range of cells along an axis of a query that is prepared run by run, and the most runs that it can have: as the range is
-/// narrower than a region, a row is two of them at most.
+/// Fewest positions whose memory is worth asking for ahead: smaller grids stay near the processor.
+const LARGE: usize = 1 << 15;
+/// Widest range of cells along an axis of a query in steps, and the most runs it has: as the range is narrower than a region, a row is two of
+/// them at most.
 const SHORT: i32 = 2;
 const RUNS: usize = 8;
 /// Vectors of positions that are asked for ahead in each run.
@@ -73,8 +75,8 @@ const FETCHED: usize = 4;
 const HELD: usize = 32;
 
 /// A query in steps, so that the memory of each can be asked for while there is other work: [`Grid::search`], [`Grid::approach`],
-/// [`Grid::find`], [`Grid::visit`].
-#[derive(Clone, Copy, Debug)]
+/// [`Grid::find`], [`Grid::visit`]. Used again and again.
+#[derive(Clone, Debug, Default)]
 pub struct Search {
     from: Vec3,
     radius: f32,
@@ -84,8 +86,8 @@ pub struct Search {
     /// Places found, as many as there is room for, and how many there are.
     places: [u32; HELD],
     found: usize,
-    /// Too wide to list its runs.
-    wide: bool,
+    /// Wide queries, and those of small grids, do everything in the last step.
+    stepwise: bool,
 }
 
 impl Grid {
@@ -162,33 +164,41 @@ impl Grid {
 
     /// Begins a query in steps: asks for the memory that says where the runs lie.
     #[inline(always)]
-    pub fn search(&self, p: Vec3, radius: f32) -> Search {
+    pub fn search(&self, search: &mut Search, p: Vec3, radius: f32) {
+        (search.from, search.radius, search.stepwise) = (p, radius, false);
+        if self.count < LARGE {
+            return;
+        }
         let (low, high) = self.box_of(p, radius);
-        let mut search = Search { from: p, radius, runs: [(0, 0); RUNS], count: 0, places: [0; HELD], found: 0, wide: true };
         if high.wrapping_sub(low).cmplt(IVec3::splat(SHORT)).all() {
-            search.wide = false;
+            (search.stepwise, search.count) = (true, 0);
             self.each_run(low, high, |_, buckets| {
                 fetch(&self.starts[buckets.0 as usize]);
                 search.runs[search.count & (RUNS - 1)] = buckets;
                 search.count += 1;
             });
         }
-        search
     }
 
     /// The second step: asks for the positions in the runs.
     #[inline(always)]
     pub fn approach(&self, search: &mut Search) {
-        for run in &mut search.runs[..search.count & (2 * RUNS - 1)] {
-            let (start, end) = self.places(*run);
-            *run = (start as u32, end as u32);
-            // None where the run is empty.
-            let lanes = self.lanes.get(start / 8..end.div_ceil(8)).unwrap_or_default();
-            for eight in lanes.iter().take(FETCHED) {
-                fetch(eight);
-                fetch(&eight.z);
+        if !search.stepwise {
+            return;
+        }
+        let mut kept = 0;
+        for run in 0..search.count.min(RUNS) {
+            let (start, end) = self.places(search.runs[run]);
+            if start < end {
+                search.runs[kept] = (start as u32, end as u32);
+                kept += 1;
+                for eight in &self.lanes[start / 8..end.div_ceil(8).min(start / 8 + FETCHED)] {
+                    fetch(eight);
+                    fetch(&eight.z);
+                }
             }
         }
+        search.count = kept;
     }
 
     /// The places of the buckets from the first to the last.
@@ -197,12 +207,15 @@ impl Grid {
         (self.starts[first as usize] as usize, self.starts[last as usize + 1] as usize)
     }
 
-    /// The third step, after [`Grid::approach`]: finds the positions, and calls `found` with the place of each.
+    /// The third step: finds the positions, and calls `found` with the place of each.
     #[inline(always)]
     pub fn find(&self, search: &mut Search, found: impl Fn(usize)) {
+        if !search.stepwise {
+            return;
+        }
         let (from, radius2) = (Vec3x8::splat(search.from), f32x8::splat(search.radius * search.radius));
         let (held, mut count) = (&mut search.places, 0);
-        for &(start, end) in &search.runs[..search.count & (2 * RUNS - 1)] {
+        for &(start, end) in &search.runs[..search.count.min(RUNS)] {
             self.visit_run((start as usize, end as usize), from, radius2, &mut |place, _| {
                 found(place);
                 held[count & (HELD - 1)] = place as u32;
@@ -212,13 +225,14 @@ impl Grid {
         search.found = count;
     }
 
-    /// The last step: calls `visit` with the places that [`Grid::find`] found, the same as [`Grid::query`] and in the same order.
+    /// The last step: calls `visit` with the places of all positions closer than the radius, the same as [`Grid::query`] and in the same order.
     #[inline(always)]
     pub fn visit(&self, search: &Search, mut visit: impl FnMut(usize)) {
-        if search.wide || search.found > HELD {
-            return self.query(search.from, search.radius, |place, _| visit(place));
+        if search.stepwise && search.found <= HELD {
+            search.places[..search.found].iter().for_each(|&place| visit(place as usize));
+        } else {
+            self.query(search.from, search.radius, |place, _| visit(place));
         }
-        search.places[..search.found & (2 * HELD - 1)].iter().for_each(|&place| visit(place as usize));
     }
 
     /// The cells from `low` to `high`, run by run: the first and the last cell, and their buckets.
@@ -364,6 +378,31 @@ mod tests {
                 assert!(visited.is_sorted(), "cell {cell}, radius {radius}");
             }
         }
+    }
+
+    /// In steps a query visits what it visits at once, in the same order: few positions and more than there is room for, narrow and wide boxes,
+    /// large grids and small ones.
+    #[test]
+    fn a_query_in_steps_is_the_query() {
+        let (mut found_few, mut found_many, mut search) = (0, 0, Search::default());
+        for (count, cell) in [(LARGE, 0.012), (LARGE, 0.06), (LARGE - 1, 0.06)] {
+            let points = points(count, 1.0);
+            let (grid, _) = Grid::build(points.len(), |i| points[i], cell);
+            for &p in points.iter().step_by(211) {
+                for radius in [0.1 * cell, 0.49 * cell, 1.7 * cell, 6.0 * cell] {
+                    let (mut at_once, mut in_steps) = (Vec::new(), Vec::new());
+                    grid.query(p, radius, |place, _| at_once.push(place));
+                    grid.search(&mut search, p, radius);
+                    grid.approach(&mut search);
+                    grid.find(&mut search, |_| ());
+                    grid.visit(&search, |place| in_steps.push(place));
+                    assert_eq!(in_steps, at_once, "{count} positions, cell {cell}, radius {radius}");
+                    let counted = if search.found > HELD { &mut found_many } else { &mut found_few };
+                    *counted += usize::from(search.stepwise);
+                }
+            }
+        }
+        assert!(found_few > 100 && found_many > 10, "{found_few}, {found_many}");
     }
 
     #[test]

@@ -51,8 +51,7 @@ impl SurfacePoint<'_> {
         }
         let (given, sampled) = (self.given_local, self.frame.to_local(w));
         let (f, pdfs) = self.bsdf.eval_pdfs(self.uv, given, sampled, mode)?;
-        let (fwd, rev) =
-            with_survival(mode, f.max_component(), pdfs, self.square_index(given, sampled), [sampled.z, given.z]);
+        let (fwd, rev) = with_survival(mode, f.max_component(), pdfs, self.square_index(given, sampled), [sampled.z, given.z]);
         Some(Met { f, fwd, rev })
     }
 

@@ -43,7 +43,7 @@ impl<'a> Iteration<'a, '_> {
         let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
         let partner = if self.techniques.connections { light.partner(number) } else { None };
-        let mut sum = Rgb::BLACK;
+        let (mut sum, mut search) = (Rgb::BLACK, Search::default());
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
             if vertex.hit.emitter.is_some() {
                 sum += tally.finite(self.hit(vertex, record));
@@ -52,16 +52,18 @@ impl<'a> Iteration<'a, '_> {
             if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
                 // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
                 let merging = merging.filter(|_| vertex.carried.share > 0.0);
-                let mut search = merging.map(|merging| merging.store.grid().search(point.end.p, self.radius));
+                if let Some(merging) = merging {
+                    merging.store.grid().search(&mut search, point.end.p, self.radius);
+                }
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
                 }
-                if let Some((merging, search)) = merging.zip(search.as_mut()) {
-                    merging.store.grid().approach(search);
+                if let Some(merging) = merging {
+                    merging.store.grid().approach(&mut search);
                 }
-                let mut sought = merging.zip(search.as_mut());
-                let mut find = || sought.take().map(|(merging, search)| merging.store.find(search));
+                let mut sought = merging;
+                let mut find = || sought.take().map(|merging| merging.store.find(&mut search));
                 if let Some(partner) = &partner {
                     for (end, letters) in partner.vertices() {
                         let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
@@ -70,7 +72,7 @@ impl<'a> Iteration<'a, '_> {
                     }
                 }
                 find();
-                if let Some((merging, search)) = merging.zip(search) {
+                if let Some(merging) = merging {
                     let found = self.merge(vertex, &point, (merging, &search), record);
                     sum += tally.finite(found);
                 }
