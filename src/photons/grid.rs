@@ -5,9 +5,13 @@
 use super::cells::{Cells, NEAR, end_of_row};
 use super::sort::sort;
 use crate::math::eight::{Vec3x8, bits};
+use crate::math::fetch;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 use wide::f32x8;
+
+/// So many items before its turn an item's memory is asked for.
+const AHEAD: usize = 16;
 
 /// Which item stands at each place of a grid.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +35,18 @@ impl Order {
 
     /// What belongs to the items, place by place; `item` is asked once for the number of each.
     pub fn gather<T: Send>(&self, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        self.0.par_iter().with_min_len(1 << 12).map(|&i| item(i as usize)).collect()
+        self.gather_ahead(|_| (), item)
+    }
+
+    /// [`Order::gather`]; `ahead` is told of each number before its turn, to ask for the memory: items lie anywhere.
+    pub fn gather_ahead<T: Send>(&self, ahead: impl Fn(usize) + Sync, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let one = |(place, &i): (usize, &u32)| {
+            if let Some(&later) = self.0.get(place + AHEAD) {
+                ahead(later as usize);
+            }
+            item(i as usize)
+        };
+        self.0.par_iter().with_min_len(1 << 12).enumerate().map(one).collect()
     }
 }
 
@@ -46,6 +61,33 @@ pub struct Grid {
     /// Bucket `b` holds the places `starts[b]..starts[b + 1]`.
     starts: Vec<u32>,
     cells: Cells,
+}
+
+/// Fewest positions whose memory is worth asking for ahead: smaller grids stay near the processor.
+const LARGE: usize = 1 << 15;
+/// Widest range of cells along an axis of a query in steps, and the most runs it has: as the range is narrower than a region, a row is two of
+/// them at most.
+const SHORT: i32 = 2;
+const RUNS: usize = 8;
+/// Vectors of positions that are asked for ahead in each run.
+const FETCHED: usize = 4;
+/// Places found that there is room for.
+const HELD: usize = 32;
+
+/// A query in steps, so that the memory of each can be asked for while there is other work: [`Grid::search`], [`Grid::approach`],
+/// [`Grid::find`], [`Grid::visit`]. Used again and again.
+#[derive(Clone, Debug, Default)]
+pub struct Search {
+    from: Vec3,
+    radius: f32,
+    /// First and last bucket of each run; after [`Grid::approach`] where its places begin and end.
+    runs: [(u32, u32); RUNS],
+    count: usize,
+    /// Places found, as many as there is room for, and how many there are.
+    places: [u32; HELD],
+    found: usize,
+    /// Wide queries, and those of small grids, do everything in the last step.
+    stepwise: bool,
 }
 
 impl Grid {
@@ -96,15 +138,13 @@ impl Grid {
     /// that depends on the positions and the cells' side alone. Allocates nothing.
     #[inline]
     pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(usize, f32)) {
-        // Differences, squares, sums and floors round monotonically: what rounding finds closer than the radius, it finds inside this box too.
-        let reach = Vec3::splat(radius);
-        let (low, high) = (self.cells.of(p - reach), self.cells.of(p + reach));
+        let (low, high) = self.box_of(p, radius);
         let (from, radius2) = (Vec3x8::splat(p), f32x8::splat(radius * radius));
         if high.wrapping_sub(low).cmplt(IVec3::splat(NEAR)).all() {
-            self.each_run(low, high, |_, run| self.visit_run(run, from, radius2, &mut visit));
+            self.each_run(low, high, |_, buckets| self.visit_run(self.places(buckets), from, radius2, &mut visit));
         } else {
-            self.each_run(low, high, |[first, last], run| {
-                self.visit_run(run, from, radius2, &mut |place, distance2| {
+            self.each_run(low, high, |[first, last], buckets| {
+                self.visit_run(self.places(buckets), from, radius2, &mut |place, distance2| {
                     let cell = self.cells.of(self.position(place));
                     if cell.cmpge(first).all() && cell.cmple(last).all() {
                         visit(place, distance2);
@@ -114,9 +154,90 @@ impl Grid {
         }
     }
 
-    /// The cells from `low` to `high`, run by run: the first and the last cell, and where their places begin and end.
+    /// The first and the last cell along each axis that a query touches.
     #[inline(always)]
-    fn each_run(&self, low: IVec3, high: IVec3, mut of_run: impl FnMut([IVec3; 2], (usize, usize))) {
+    fn box_of(&self, p: Vec3, radius: f32) -> (IVec3, IVec3) {
+        // Differences, squares, sums and floors round monotonically: what rounding finds closer than the radius, it finds inside this box too.
+        let reach = Vec3::splat(radius);
+        (self.cells.of(p - reach), self.cells.of(p + reach))
+    }
+
+    /// Begins a query in steps: asks for the memory that says where the runs lie.
+    #[inline(always)]
+    pub fn search(&self, search: &mut Search, p: Vec3, radius: f32) {
+        (search.from, search.radius, search.stepwise) = (p, radius, false);
+        if self.count < LARGE {
+            return;
+        }
+        let (low, high) = self.box_of(p, radius);
+        if high.wrapping_sub(low).cmplt(IVec3::splat(SHORT)).all() {
+            (search.stepwise, search.count) = (true, 0);
+            self.each_run(low, high, |_, buckets| {
+                fetch(&self.starts[buckets.0 as usize]);
+                search.runs[search.count & (RUNS - 1)] = buckets;
+                search.count += 1;
+            });
+        }
+    }
+
+    /// The second step: asks for the positions in the runs.
+    #[inline(always)]
+    pub fn approach(&self, search: &mut Search) {
+        if !search.stepwise {
+            return;
+        }
+        let mut kept = 0;
+        for run in 0..search.count.min(RUNS) {
+            let (start, end) = self.places(search.runs[run]);
+            if start < end {
+                search.runs[kept] = (start as u32, end as u32);
+                kept += 1;
+                for eight in &self.lanes[start / 8..end.div_ceil(8).min(start / 8 + FETCHED)] {
+                    fetch(eight);
+                    fetch(&eight.z);
+                }
+            }
+        }
+        search.count = kept;
+    }
+
+    /// The places of the buckets from the first to the last.
+    #[inline(always)]
+    fn places(&self, (first, last): (u32, u32)) -> (usize, usize) {
+        (self.starts[first as usize] as usize, self.starts[last as usize + 1] as usize)
+    }
+
+    /// The third step: finds the positions, and calls `found` with the place of each.
+    #[inline(always)]
+    pub fn find(&self, search: &mut Search, found: impl Fn(usize)) {
+        if !search.stepwise {
+            return;
+        }
+        let (from, radius2) = (Vec3x8::splat(search.from), f32x8::splat(search.radius * search.radius));
+        let (held, mut count) = (&mut search.places, 0);
+        for &(start, end) in &search.runs[..search.count.min(RUNS)] {
+            self.visit_run((start as usize, end as usize), from, radius2, &mut |place, _| {
+                found(place);
+                held[count & (HELD - 1)] = place as u32;
+                count += 1;
+            });
+        }
+        search.found = count;
+    }
+
+    /// The last step: calls `visit` with the places of all positions closer than the radius, the same as [`Grid::query`] and in the same order.
+    #[inline(always)]
+    pub fn visit(&self, search: &Search, mut visit: impl FnMut(usize)) {
+        if search.stepwise && search.found <= HELD {
+            search.places[..search.found].iter().for_each(|&place| visit(place as usize));
+        } else {
+            self.query(search.from, search.radius, |place, _| visit(place));
+        }
+    }
+
+    /// The cells from `low` to `high`, run by run: the first and the last cell, and their buckets.
+    #[inline(always)]
+    fn each_run(&self, low: IVec3, high: IVec3, mut of_run: impl FnMut([IVec3; 2], (u32, u32))) {
         let mut z = low.z;
         loop {
             let mut y = low.y;
@@ -125,9 +246,8 @@ impl Grid {
                 let mut x = low.x;
                 loop {
                     let last = end_of_row(x).min(high.x);
-                    let bucket = row.bucket(x) as usize;
-                    let run = (self.starts[bucket] as usize, self.starts[bucket + (last - x) as usize + 1] as usize);
-                    of_run([IVec3::new(x, y, z), IVec3::new(last, y, z)], run);
+                    let bucket = row.bucket(x);
+                    of_run([IVec3::new(x, y, z), IVec3::new(last, y, z)], (bucket, bucket + (last - x) as u32));
                     if last >= high.x {
                         break;
                     }
@@ -258,6 +378,31 @@ mod tests {
                 assert!(visited.is_sorted(), "cell {cell}, radius {radius}");
             }
         }
+    }
+
+    /// In steps a query visits what it visits at once, in the same order: few positions and more than there is room for, narrow and wide boxes,
+    /// large grids and small ones.
+    #[test]
+    fn a_query_in_steps_is_the_query() {
+        let (mut found_few, mut found_many, mut search) = (0, 0, Search::default());
+        for (count, cell) in [(LARGE, 0.012), (LARGE, 0.06), (LARGE - 1, 0.06)] {
+            let points = points(count, 1.0);
+            let (grid, _) = Grid::build(points.len(), |i| points[i], cell);
+            for &p in points.iter().step_by(211) {
+                for radius in [0.1 * cell, 0.49 * cell, 1.7 * cell, 6.0 * cell] {
+                    let (mut at_once, mut in_steps) = (Vec::new(), Vec::new());
+                    grid.query(p, radius, |place, _| at_once.push(place));
+                    grid.search(&mut search, p, radius);
+                    grid.approach(&mut search);
+                    grid.find(&mut search, |_| ());
+                    grid.visit(&search, |place| in_steps.push(place));
+                    assert_eq!(in_steps, at_once, "{count} positions, cell {cell}, radius {radius}");
+                    let counted = if search.found > HELD { &mut found_many } else { &mut found_few };
+                    *counted += usize::from(search.stepwise);
+                }
+            }
+        }
+        assert!(found_few > 100 && found_many > 10, "{found_few}, {found_many}");
     }
 
     #[test]

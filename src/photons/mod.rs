@@ -9,5 +9,5 @@ mod sort;
 pub mod store;
 
 pub use density::{DensityMap, DensitySettings};
-pub use grid::{Grid, Order};
+pub use grid::{Grid, Order, Search};
 pub use store::{Photon, Store};

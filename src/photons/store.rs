@@ -1,7 +1,7 @@
 //! What light left at surfaces, in the order of a grid.
 
-use super::grid::Grid;
-use crate::math::Rgb;
+use super::grid::{Grid, Search};
+use crate::math::{Rgb, fetch};
 use glam::Vec3;
 
 /// A photon but for its position: flux that arrived at a surface point.
@@ -29,8 +29,19 @@ pub struct Store<T> {
 impl<T: Send> Store<T> {
     /// Sorts `count` items, whose positions and contents are asked for by number, into cells of side `cell`: see [`Grid::build`].
     pub fn build(count: usize, position: impl Fn(usize) -> Vec3 + Sync, item: impl Fn(usize) -> T + Sync, cell: f32) -> Self {
+        Self::build_ahead(count, position, |_| (), item, cell)
+    }
+
+    /// [`Store::build`], telling `ahead` of items before they are asked for: see [`Order::gather_ahead`](super::Order::gather_ahead).
+    pub fn build_ahead(
+        count: usize,
+        position: impl Fn(usize) -> Vec3 + Sync,
+        ahead: impl Fn(usize) + Sync,
+        item: impl Fn(usize) -> T + Sync,
+        cell: f32,
+    ) -> Self {
         let (grid, order) = Grid::build(count, position, cell);
-        Self { grid, items: order.gather(item) }
+        Self { grid, items: order.gather_ahead(ahead, item) }
     }
 }
 
@@ -49,5 +60,17 @@ impl<T> Store<T> {
     #[inline]
     pub fn query(&self, p: Vec3, radius: f32, mut visit: impl FnMut(&T, f32)) {
         self.grid.query(p, radius, |place, distance2| visit(&self.items[place], distance2));
+    }
+
+    /// [`Grid::find`], asking for the items found.
+    #[inline(always)]
+    pub fn find(&self, search: &mut Search) {
+        self.grid.find(search, |place| fetch(&self.items[place]));
+    }
+
+    /// [`Grid::visit`] with the items.
+    #[inline(always)]
+    pub fn visit(&self, search: &Search, mut visit: impl FnMut(&T)) {
+        self.grid.visit(search, |place| visit(&self.items[place]));
     }
 }

@@ -50,13 +50,8 @@ impl SurfacePoint<'_> {
             return None;
         }
         let (given, sampled) = (self.given_local, self.frame.to_local(w));
-        let (f, pdf_fwd) = self.bsdf.eval_pdf(self.uv, given, sampled, mode, Lobes::All);
-        if f.is_black() {
-            return None;
-        }
-        let pdf_rev = self.bsdf.pdf(self.uv, sampled, given, Lobes::All);
-        let (fwd, rev) =
-            with_survival(mode, f.max_component(), [pdf_fwd, pdf_rev], self.square_index(given, sampled), [sampled.z, given.z]);
+        let (f, pdfs) = self.bsdf.eval_pdfs(self.uv, given, sampled, mode)?;
+        let (fwd, rev) = with_survival(mode, f.max_component(), pdfs, self.square_index(given, sampled), [sampled.z, given.z]);
         Some(Met { f, fwd, rev })
     }
 

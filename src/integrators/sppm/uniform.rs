@@ -2,7 +2,7 @@
 
 use super::{Counts, DENSITY, IterationStats, Sppm};
 use crate::image::film::Film;
-use crate::math::Rgb;
+use crate::math::{Rgb, fetch};
 use crate::photons::radius::shrink;
 use crate::photons::{Photon, Store};
 use crate::samplers::{Drawn, PhotonSampler, Purpose, Uniform};
@@ -77,7 +77,7 @@ impl Sppm<'_> {
         }
         stats.light_paths += draw.traced;
         let cell = self.cell * shrink(i, self.settings.alpha) as f32;
-        (Store::build(photons.len(), |i| photons[i].0, |i| photons[i].1, cell), draw.scales)
+        (Store::build_ahead(photons.len(), |i| photons[i].0, |i| fetch(&photons[i].1), |i| photons[i].1, cell), draw.scales)
     }
 
     /// Flux density around a measurement point, strata scaled, times throughput and BSDF. Counts the photons it takes.

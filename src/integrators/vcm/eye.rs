@@ -5,6 +5,7 @@ use super::light::{LightSide, LightVertex, Merging};
 use super::pyramid::Recorder;
 use super::technique::Technique;
 use crate::math::Rgb;
+use crate::photons::Search;
 use crate::samplers::{Key, Purpose, Stream};
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraRay;
@@ -43,26 +44,38 @@ impl<'a> Iteration<'a, '_> {
         let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
         let partner = if self.techniques.connections { light.partner(number) } else { None };
-        let mut sum = Rgb::BLACK;
+        let (mut sum, mut search) = (Rgb::BLACK, Search::default());
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
             if vertex.hit.emitter.is_some() {
                 sum += tally.finite(self.hit(vertex, record));
             }
             let goes_on = vertex.carried.edges < self.depths.max;
             if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
+                // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
+                let merging = merging.filter(|_| vertex.carried.share > 0.0);
+                if let Some(merging) = merging {
+                    merging.store.grid().search(&mut search, point.end.p, self.radius);
+                }
                 if self.techniques.connections {
                     let found = self.next_event(vertex, &point, stream, tally, record);
                     sum += tally.finite(found);
-                    if let Some(partner) = &partner {
-                        for (end, letters) in partner.vertices() {
-                            let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
-                            sum += tally.finite(found);
-                        }
+                }
+                if let Some(merging) = merging {
+                    merging.store.grid().approach(&mut search);
+                }
+                let mut sought = merging;
+                let mut find = || sought.take().map(|merging| merging.store.find(&mut search));
+                if let Some(partner) = &partner {
+                    for (end, letters) in partner.vertices() {
+                        let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
+                        sum += tally.finite(found);
+                        find();
                     }
                 }
-                if let Some(merging) = merging.filter(|_| vertex.carried.share > 0.0) {
+                find();
+                if let Some(merging) = merging {
                     record.merges_at(&point.end);
-                    let found = self.merge(vertex, &point, merging, record);
+                    let found = self.merge(vertex, &point, (merging, &search), record);
                     sum += tally.finite(found);
                 }
             }
@@ -209,11 +222,17 @@ impl<'a> Iteration<'a, '_> {
         )
     }
 
-    /// Merges with the light vertices around.
-    fn merge<R: Recorder>(&self, vertex: &SubpathVertex<'a>, point: &SurfacePoint<'a>, merging: &Merging, record: &mut R) -> Rgb {
+    /// Merges with the light vertices around, whose search has been prepared.
+    fn merge<R: Recorder>(
+        &self,
+        vertex: &SubpathVertex<'a>,
+        point: &SurfacePoint<'a>,
+        (merging, search): (&Merging, &Search),
+        record: &mut R,
+    ) -> Rgb {
         let mut sum = Rgb::BLACK;
         let (n_g, n_s) = (point.end.n_g, point.frame.n);
-        merging.store.query(point.end.p, self.radius, |photon, _| {
+        merging.store.visit(search, |photon| {
             let carried = photon.carried();
             let edges = vertex.carried.edges + carried.edges;
             if !self.depths.contains(edges) || !accepts(n_g, n_s, photon.n_g, photon.wi) {

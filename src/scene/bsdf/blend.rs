@@ -23,9 +23,12 @@ impl Blend {
     #[inline(always)]
     fn shares(&self, uv: Vec2, lobes: Lobes) -> (f32, f32) {
         let weight = self.weight.eval_1(uv).clamp(0.0, 1.0);
-        let probability = match (lobes, self.first.admitted_by(lobes), self.second.admitted_by(lobes)) {
-            (Lobes::All, _, _) | (_, true, true) => weight,
-            (_, _, second) => f32::from(u8::from(second)),
+        let probability = match lobes {
+            Lobes::All => weight,
+            _ => match (self.first.admitted_by(lobes), self.second.admitted_by(lobes)) {
+                (true, true) => weight,
+                (_, second) => f32::from(u8::from(second)),
+            },
         };
         (weight, probability)
     }

@@ -277,6 +277,20 @@ impl Bsdf {
         }
     }
 
+    /// The value of all lobes that are no deltas, with the density of `sampled` given `given` and that with the roles exchanged: as
+    /// [`Bsdf::eval_pdf`] and [`Bsdf::pdf`] say them. `None` where the value is black.
+    #[inline(always)]
+    pub fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode) -> Option<(Rgb, [f32; 2])> {
+        let (b, side) = self.facing(given);
+        if let Bsdf::Diffuse(b) = b {
+            let (given, sampled) = (turned(given, side), turned(sampled, side));
+            let (f, pdf) = b.eval_pdf(uv, given, sampled, mode, Lobes::All);
+            return (!f.is_black()).then(|| (f, [pdf, b.pdf(uv, sampled, given, Lobes::All)]));
+        }
+        let (f, pdf) = self.eval_pdf_any(uv, &given, &sampled, mode, Lobes::All);
+        (!f.is_black()).then(|| (f, [pdf, self.pdf(uv, sampled, given, Lobes::All)]))
+    }
+
     /// [`Bsdf::eval_pdf`] out of line: the commonest material is worth a place in every loop, all of them are not.
     #[inline(never)]
     fn eval_pdf_any(&self, uv: Vec2, given: &Vec3, sampled: &Vec3, mode: Mode, lobes: Lobes) -> (Rgb, f32) {
