@@ -6,7 +6,7 @@
 //! of it, so it is dropped \[HACHISUKA11\]. Which rung steps and whom it asks depends on counts alone, never on states: each step is
 //! a kernel that keeps the product of all rungs' laws, and so does any fixed sequence of them.
 //!
-//! **Steps of all sizes.** A small step has the chain's size `d`, or one of `d/2, d/4, ... d/64`, all equally likely. One size steered to a wanted
+//! **Steps of all sizes.** A small step has the chain's size `d`, or one of `d/4, d/16, ... d/4096`, all equally likely. One size steered to a wanted
 //! mean acceptance fits the places where the chain is most of the time; where a target has wide parts and narrow ones (light far off, and
 //! near the camera) it is far too large for the narrow ones, and a chain that gets there stands still for hundreds of steps. A mixture of
 //! symmetric kernels is symmetric.
