@@ -154,7 +154,7 @@ fn merges_alone_on_a_glossy_path_are_the_path_tracer() {
 #[ignore = "minutes; run by .ci/run"]
 fn techniques_alone_by_chains_are_the_path_tracer() {
     let sampler = ", \"sampler\": \"visibility\", \"rest\": \"never\", \"burn_in\": 200, \"photons\": 4000";
-    pure(64, 0.1, sampler, |class, technique| ["LDE", "LDDE"].contains(&class) && !["vc0", "vc1"].contains(&technique));
+    pure(96, 0.1, sampler, |class, technique| ["LDE", "LDDE"].contains(&class) && !["vc0", "vc1"].contains(&technique));
 }
 
 /// All techniques together, by every heuristic.
