@@ -31,41 +31,57 @@ pub(crate) fn floors(rungs: usize) -> Vec<f64> {
     (0..rungs).map(|rung| if rung == 0 { FLOOR_UNIFORM } else { chain }).collect()
 }
 
+/// Paths looked at together.
+const LANES: usize = 8;
+
 /// Sampled paths: for each the densities `g_c` and its part of `integral h du`.
 #[derive(Clone, Debug)]
 pub(crate) struct Problem {
     rungs: usize,
-    densities: Vec<f64>,
-    useful: Vec<f64>,
+    /// Of [`LANES`] paths: rung by rung their densities, then their parts of the integral. Places without a path have the density 1 and no part.
+    groups: Vec<[f64; LANES]>,
+    paths: usize,
 }
 
 impl Problem {
     /// Without a path.
     pub(crate) fn new(rungs: usize) -> Self {
-        Self { rungs, densities: Vec::new(), useful: Vec::new() }
+        Self { rungs, groups: Vec::new(), paths: 0 }
     }
 
     /// Adds a path; one that is no use or has no finite part is left out, since it says nothing about shares.
     pub(crate) fn push(&mut self, densities: impl Iterator<Item = f64>, useful: f64) {
         if useful > 0.0 && useful.is_finite() {
-            self.densities.extend(densities);
-            self.useful.push(useful);
+            let lane = self.paths % LANES;
+            if lane == 0 {
+                self.groups.extend(std::iter::repeat_n([1.0; LANES], self.rungs));
+                self.groups.push([0.0; LANES]);
+            }
+            let group = self.groups.len() - self.rungs - 1;
+            self.groups[group..].iter_mut().zip(densities.chain([useful])).for_each(|(place, number)| place[lane] = number);
+            self.paths += 1;
         }
     }
 
     /// `V` and the gains `G_c` at given shares.
     fn value(&self, shares: &[f64], gains: &mut [f64]) -> f64 {
-        gains.fill(0.0);
-        let mut value = 0.0;
-        for (row, useful) in self.densities.chunks_exact(self.rungs).zip(&self.useful) {
-            let q: f64 = row.iter().zip(shares).map(|(g, s)| g * s).sum();
-            let part = useful / q;
-            value += part;
-            for (gain, g) in gains.iter_mut().zip(row) {
-                *gain += part / q * g;
+        let mut sums = vec![[0.0; LANES]; self.rungs];
+        let mut value = [0.0; LANES];
+        for group in self.groups.chunks_exact(self.rungs + 1) {
+            let (densities, useful) = (&group[..self.rungs], &group[self.rungs]);
+            let mut q = [0.0; LANES];
+            for (g, share) in densities.iter().zip(shares) {
+                (0..LANES).for_each(|i| q[i] += g[i] * share);
+            }
+            let part: [f64; LANES] = std::array::from_fn(|i| useful[i] / q[i]);
+            (0..LANES).for_each(|i| value[i] += part[i]);
+            let part: [f64; LANES] = std::array::from_fn(|i| part[i] / q[i]);
+            for (sum, g) in sums.iter_mut().zip(densities) {
+                (0..LANES).for_each(|i| sum[i] += part[i] * g[i]);
             }
         }
-        value
+        gains.iter_mut().zip(&sums).for_each(|(gain, sum)| *gain = sum.iter().sum());
+        value.iter().sum()
     }
 
     /// `V` at these shares over `V` of rung 0 alone: what chains do to the variance for the same cost. 1 if no path is any use.
@@ -79,7 +95,7 @@ impl Problem {
     /// Shares of the cost that minimise `V`, none below its floor. `None` if no path is any use. Updates begin with all that floors leave on
     /// rung 0, and rungs with equal densities keep their proportion: of equally good shares it is the one with most independent paths.
     pub(crate) fn solve(&self, floors: &[f64]) -> Option<Vec<f64>> {
-        if self.useful.is_empty() {
+        if self.paths == 0 {
             return None;
         }
         let mut shares = floors.to_vec();

@@ -34,6 +34,10 @@ const FIRST_DISPERSION: f64 = 5.0;
 /// Variance that chains must fall below, relative to independent paths at the same cost of paths alone. Easy scenes are foreseen at 0.85 to 1,
 /// hard ones below 0.7 (docs/methods/samplers.md).
 const WORTHWHILE: f64 = 0.8;
+/// Draws whose samples all shape the allocation; later ones do by turns, since it moves little.
+const SHAPING: u64 = 8;
+/// Of later draws one in this many.
+const SHAPING_TURN: u64 = 4;
 /// Samples for the allocation per rung and ensemble: 4096 for four rungs and sixteen ensembles.
 const SAMPLES: u64 = 64;
 
@@ -201,8 +205,14 @@ impl Ladder {
             exchanges: self.exchanges,
             trace_strides: stride(TRACE_POINTS as u64),
             carry_strides: stride(KEPT),
-            sample_strides: if settings.allocation == Allocation::Measured { stride(SAMPLES) } else { Vec::new() },
+            sample_strides: if self.shaping() { stride(SAMPLES) } else { Vec::new() },
         }
+    }
+
+    /// Whether this draw's samples decide on the shares of the next.
+    fn shaping(&self) -> bool {
+        let turn = self.draws < SHAPING || self.draws.is_multiple_of(SHAPING_TURN);
+        self.settings.allocation == Allocation::Measured && self.strata() > 1 && turn
     }
 
     /// Shares of the next draw, from this one's samples.
@@ -270,7 +280,7 @@ impl PhotonSampler for Ladder {
         drawn.carry(&mut self.carried);
         self.summary.add(&drawn, &shares, &plan.trace_strides);
         self.normalisation.update(&drawn.ratios(), self.settings.normaliser == Normaliser::Pooled);
-        if self.settings.allocation == Allocation::Measured && rungs > 1 {
+        if self.shaping() {
             self.allocate(&drawn);
         }
         self.draws += 1;

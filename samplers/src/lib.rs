@@ -9,9 +9,11 @@ pub mod ladder;
 mod mutation;
 pub mod sampler;
 mod state;
+pub mod stratified;
 pub mod stream;
 
 pub use diagnostics::{LadderReport, RungReport, TRACE_POINTS, Warning, warnings};
 pub use ladder::{Allocation, Combine, Ladder, LadderSettings, Normaliser};
 pub use sampler::{CELLS, Draw, Drawn, LightPathSpace, PhotonSampler, Uniform};
+pub use stratified::StratifiedStream;
 pub use stream::{Key, Purpose, Recorder, Replay, Stream, UniformStream};

@@ -65,7 +65,7 @@ impl<'a> Eye<'a> {
 
     /// An iteration's subpath of a pixel, for the purpose that its key has.
     pub(super) fn sample(&self, (iteration, purpose): (u64, Purpose), pixel: usize, radius: Radius, tally: &mut Tally) -> Seen<'a> {
-        let mut stream = pixel_stream(self.common.seed, iteration, pixel, purpose);
+        let mut stream = Key { seed: self.common.seed, iteration, index: pixel as u64, purpose }.stratified();
         let jitter = Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         self.measure(pixel, jitter, lens, radius, &mut stream, tally)

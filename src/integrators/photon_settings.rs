@@ -144,7 +144,7 @@ pub struct ChainSettings {
     #[arg(long, value_enum, value_name = "HOW")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub combine: Option<CombineName>,
-    /// Proposals a chain thrown away where its targets are new: before iterations 0, 1, 2, 4, 8, ...; default 1000 before 0, 250 later
+    /// Proposals a chain thrown away where its targets are new: before iterations 0, 1, 2, 4, 8, ...; default 250 before 0, 64 later
     #[arg(long, value_name = "B")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub burn_in: Option<u64>,

@@ -130,11 +130,11 @@ pub(super) struct Ensemble<'a, P: LightPathSpace, A, E> {
     burn_in: u64,
     chains: &'a mut [Chain],
     random: UniformStream,
-    /// States of rungs 1 and up.
-    states: Vec<State<P::Path>>,
+    /// States of rungs 1 and up. They and the proposal change places in nearly every step, so what moves is where they are.
+    states: Vec<Box<State<P::Path>>>,
     /// Step sizes and turns of the chains.
     sizes: Vec<(StepSize, u64)>,
-    proposal: State<P::Path>,
+    proposal: Box<State<P::Path>>,
     tallies: Vec<Tally>,
     accumulator: A,
     emit: &'a E,
@@ -161,7 +161,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
         let mut traced = 0;
         let mut states = Vec::with_capacity(chains.len());
         for (rung, chain) in chains.iter().enumerate().map(|(i, chain)| (i + 1, chain)) {
-            let mut state = State::new(rungs);
+            let mut state = Box::new(State::new(rungs));
             state.climbed = chain.climbed;
             if chain.life != Life::Empty {
                 state.replay(space, rung, &chain.coordinates, &mut random);
@@ -185,7 +185,7 @@ impl<'a, P: LightPathSpace, A, E: Fn(&mut A, &P::Path, &[Drawn])> Ensemble<'a, P
             random,
             states,
             sizes,
-            proposal: State::new(rungs),
+            proposal: Box::new(State::new(rungs)),
             tallies,
             accumulator,
             emit,

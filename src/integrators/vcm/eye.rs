@@ -33,7 +33,7 @@ impl<'a> Iteration<'a, '_> {
     ) -> Rgb {
         let number = y * self.size.0 + x;
         record.start(number);
-        let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stream();
+        let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stratified();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         let seen = self.subpaths.scene.camera().ray(film, lens);
