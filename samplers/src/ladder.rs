@@ -34,7 +34,7 @@ const FIRST_DISPERSION: f64 = 5.0;
 /// Variance that chains must fall below, relative to independent paths at the same cost of paths alone. Easy scenes are foreseen at 0.85 to 1,
 /// hard ones below 0.7 (docs/methods/samplers.md).
 const WORTHWHILE: f64 = 0.8;
-/// Draws whose samples all shape the allocation; later ones do by turns, since it moves little.
+/// Draws whose samples all shape the allocation; later ones do where their targets are new, or by turns, since it moves little.
 const SHAPING: u64 = 8;
 /// Of later draws one in this many.
 const SHAPING_TURN: u64 = 4;
@@ -211,7 +211,7 @@ impl Ladder {
 
     /// Whether this draw's samples decide on the shares of the next.
     fn shaping(&self) -> bool {
-        let turn = self.draws < SHAPING || self.draws.is_multiple_of(SHAPING_TURN);
+        let turn = self.draws < SHAPING || self.retargeted || self.draws.is_multiple_of(SHAPING_TURN);
         self.settings.allocation == Allocation::Measured && self.strata() > 1 && turn
     }
 
