@@ -289,6 +289,16 @@ impl PhotonSettings {
         self.photons.unwrap_or(pixels.max(least))
     }
 
+    /// Camera subpaths a pixel that bidirectional methods trace in an iteration unless told otherwise: one, and with the least number of light
+    /// paths that chains have, on films of fewer pixels, as many as make both sides about equally many.
+    pub fn balanced_camera_paths(&self, size: (usize, usize)) -> usize {
+        let pixels = (size.0 * size.1).max(1) as f64;
+        match self.sampler {
+            SamplerName::Uniform => 1,
+            _ => (self.photon_count(size) as f64 / pixels).round().max(1.0) as usize,
+        }
+    }
+
     /// Where densities are read.
     pub fn refinement(&self) -> Refinement {
         let chains = &self.chains;

@@ -40,6 +40,16 @@ use serde_json::{Value, json};
 pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
 pub use technique::{Technique, TechniqueName};
 
+/// What the engine is told, whichever method asks.
+struct EngineSettings {
+    techniques: Techniques,
+    heuristic: Heuristic,
+    photons: PhotonSettings,
+    /// Camera subpaths a pixel and iteration.
+    camera_paths: Option<u32>,
+    alone: Option<Technique>,
+}
+
 /// The engine bound to a scene.
 struct Engine<'a> {
     scene: &'a Scene,
@@ -48,6 +58,8 @@ struct Engine<'a> {
     techniques: Techniques,
     heuristic: Heuristic,
     photons: PhotonSettings,
+    /// Camera subpaths a pixel and iteration, at least 1.
+    camera_paths: usize,
     /// Radius of iteration 0, world units; what it is without merges means nothing.
     radius: f64,
     /// What earlier iterations tell of how dense photons lie; `None` for heuristics that do not ask.
@@ -58,18 +70,12 @@ struct Engine<'a> {
 }
 
 impl<'a> Engine<'a> {
-    fn new(
-        scene: &'a Scene,
-        size: (usize, usize),
-        common: &Common,
-        techniques: Techniques,
-        heuristic: Heuristic,
-        photons: PhotonSettings,
-        alone: Option<Technique>,
-    ) -> Self {
+    fn new(scene: &'a Scene, size: (usize, usize), common: &Common, settings: EngineSettings) -> Self {
+        let EngineSettings { techniques, heuristic, photons, camera_paths, alone } = settings;
+        let camera_paths = camera_paths.map_or_else(|| photons.balanced_camera_paths(size), |paths| paths.max(1) as usize);
         let ladder = if techniques.merges { photons.ladder_of_one_radius() } else { photons.ladder() };
         let aimed = ladder.map(|ladder| Aimed::new(&photons, &ladder, common.seed));
-        Self { scene, common: common.clone(), size, techniques, heuristic, photons, radius: 1.0, density: None, alone, aimed }
+        Self { scene, common: common.clone(), size, techniques, heuristic, photons, camera_paths, radius: 1.0, density: None, alone, aimed }
     }
 
     /// Camera subpaths to their first vertex that merges, or would.
@@ -99,8 +105,8 @@ impl<'a> Engine<'a> {
 
     fn sampling(&self, i: u64) -> Sampling {
         let radius = self.radius * shrink(i, self.photons.alpha);
-        let light_paths = self.light_paths() as f64;
-        Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, radius }
+        let (light_paths, camera_paths) = (self.light_paths() as f64, self.camera_paths as f64);
+        Sampling { techniques: self.techniques, heuristic: self.heuristic, light_paths, camera_paths, radius }
     }
 
     /// Iteration `i`, whose weights are made ready; `photons` is the expected number of photons that a merge finds, for heuristics that ask.
@@ -116,6 +122,7 @@ impl<'a> Engine<'a> {
             depths: self.depths(),
             radius: sampling.radius as f32,
             light_paths: sampling.light_paths,
+            camera_paths: self.camera_paths,
             merge_density: (1.0 / (sampling.merge_area() * sampling.light_paths)) as f32,
             gain: None,
             alone: self.alone,
@@ -164,7 +171,7 @@ impl Integrator for Engine<'_> {
     }
 
     fn iterate(&mut self, i: u64, film: &mut Film) -> IterationStats {
-        let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1) as u64, ..Default::default() };
+        let mut stats = IterationStats { camera_paths: (self.size.0 * self.size.1 * self.camera_paths) as u64, ..Default::default() };
         let (mut density, mut aimed) = (self.density.take(), self.aimed.take());
         let rests = aimed.as_mut().is_some_and(|aimed| !self.shines() || aimed.rests(self.light_paths()));
         let mut chains = aimed.as_mut().filter(|_| !rests);

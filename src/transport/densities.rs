@@ -168,11 +168,11 @@ impl FullPath {
     ///
     /// All terms are multiplied out in f64, so a path whose densities multiply to more than 1e300 or less than 1e-300 is out of reach.
     pub fn weights(&self, sampling: &Sampling) -> PathWeights {
-        let Sampling { techniques, heuristic, light_paths, .. } = *sampling;
+        let Sampling { techniques, heuristic, light_paths, camera_paths, .. } = *sampling;
         let edges = self.edges();
         let samples = |s: usize| match s {
             0 => f64::from(self.hit_counts(sampling)),
-            _ if s == edges => light_paths * f64::from(techniques.light_tracing),
+            _ if s == edges => light_paths / camera_paths * f64::from(techniques.light_tracing),
             _ => f64::from(techniques.connections),
         };
         let mut connections: Vec<f64> = (0..=edges).map(|s| samples(s) * self.connection(s)).collect();
@@ -225,7 +225,7 @@ mod tests {
     fn sampling(techniques: Techniques, merges: MergeWeights, beta: f64) -> Sampling {
         // An area of 0.01, 100 light paths.
         let radius = (0.01 / std::f64::consts::PI).sqrt();
-        Sampling { techniques, heuristic: Heuristic::new(merges, beta).unwrap(), light_paths: 100.0, radius }
+        Sampling { techniques, heuristic: Heuristic::new(merges, beta).unwrap(), light_paths: 100.0, camera_paths: 1.0, radius }
     }
 
     fn close(a: &[f64], b: &[f64]) {
@@ -272,6 +272,16 @@ mod tests {
         close(&[plus.merges[1]], &[33.0 / terms.iter().sum::<f64>()]);
         let star = p.weights(&sampling(Techniques::VCM, MergeWeights::VcmStar, 1.0));
         close(&[star.merges[1]], &[66.0 / 996.0]);
+    }
+
+    /// `L D E` as above with four camera paths a pixel: a splat is worth a quarter of what it was beside one sample of anything else.
+    #[test]
+    fn splats_are_shared_by_a_pixels_camera_paths() {
+        let sampling = Sampling { camera_paths: 4.0, ..sampling(Techniques::VCM, MergeWeights::Balance, 1.0) };
+        let w = path("D", 23.0).weights(&sampling);
+        let sum = 77.0 + 253.0 + 150.0 + 66.0;
+        close(&w.connections, &[77.0 / sum, 253.0 / sum, 150.0 / sum]);
+        close(&w.merges, &[0.0, 66.0 / sum, 0.0]);
     }
 
     #[test]

@@ -76,7 +76,7 @@ impl Engine<'_> {
         }
         let pairing = self.techniques.connections.then(|| {
             let mut stream = Key { seed: self.common.seed, iteration: iteration.index, index: 0, purpose: Purpose::Pair }.stream();
-            Pairing::new(&weights.concat(), iteration.pixels() as usize, count, &mut stream)
+            Pairing::new(&weights.concat(), iteration.pixels() as usize * iteration.camera_paths, count, &mut stream)
         });
         (LightSide::new(batches, pairing), sums)
     }

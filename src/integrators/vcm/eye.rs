@@ -1,4 +1,4 @@
-//! The camera's side: a subpath a pixel, and everything it is joined with.
+//! The camera's side: a pixel's subpaths, and everything they are joined with.
 
 use super::iteration::Iteration;
 use super::light::{LightSide, LightVertex, Merging};
@@ -21,7 +21,7 @@ use crate::transport::walk::{Tally, beyond_emitters};
 use glam::{Vec2, Vec3};
 
 impl<'a> Iteration<'a, '_> {
-    /// What a pixel's camera subpath finds.
+    /// What a pixel's camera subpaths find, their mean.
     pub(super) fn pixel<R: Recorder>(
         &self,
         x: usize,
@@ -33,7 +33,22 @@ impl<'a> Iteration<'a, '_> {
     ) -> Rgb {
         let number = y * self.size.0 + x;
         record.start(number);
-        let mut stream = Key { seed: self.common.seed, iteration: self.index, index: number as u64, purpose: Purpose::Camera }.stratified();
+        (0..self.camera_paths).map(|path| self.camera_subpath((x, y), path, light, merging, tally, record)).sum()
+    }
+
+    /// What subpath number `path` of a pixel's adds to that mean.
+    fn camera_subpath<R: Recorder>(
+        &self,
+        (x, y): (usize, usize),
+        path: usize,
+        light: &LightSide,
+        merging: Option<&Merging>,
+        tally: &mut Tally,
+        record: &mut R,
+    ) -> Rgb {
+        let number = y * self.size.0 + x;
+        let of_all = self.index * self.camera_paths as u64 + path as u64;
+        let mut stream = Key { seed: self.common.seed, iteration: of_all, index: number as u64, purpose: Purpose::Camera }.stratified();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         let seen = self.subpaths.scene.camera().ray(film, lens);
@@ -42,8 +57,8 @@ impl<'a> Iteration<'a, '_> {
             ray = beyond_emitters(self.subpaths.scene, ray, tally).0;
         }
         let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
-        let start = Start { ray, from: seen.end, throughput: Rgb::WHITE };
-        let partner = if self.techniques.connections { light.partner(number) } else { None };
+        let start = Start { ray, from: seen.end, throughput: Rgb::WHITE * (1.0 / self.camera_paths as f32) };
+        let partner = if self.techniques.connections { light.partner(number * self.camera_paths + path) } else { None };
         let (mut sum, mut search) = (Rgb::BLACK, Search::default());
         let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
             if vertex.hit.emitter.is_some() {

@@ -30,6 +30,8 @@ pub(super) struct Iteration<'a, 'w> {
     pub(super) radius: f32,
     /// Light subpaths an iteration.
     pub(super) light_paths: f64,
+    /// Camera subpaths of a pixel.
+    pub(super) camera_paths: usize,
     /// One over the area of merges and the number of light subpaths.
     pub(super) merge_density: f32,
     /// How much denser light subpaths lie than independent ones, by place; `None` where they are independent.

@@ -2,8 +2,8 @@
 
 use super::super::photon_settings::{ChainSettings, CombineName, GlossyPaths, PhotonSettings, SamplerName};
 use super::super::{Common, Integrator, MethodError, Settings};
-use super::Engine;
 use super::technique::{Technique, TechniqueName};
+use super::{Engine, EngineSettings};
 use crate::scene::Scene;
 use crate::transport::mis::{Heuristic, MergeWeights, Techniques};
 use clap::{Args, ValueEnum};
@@ -24,6 +24,9 @@ pub enum MergeWeightsName {
     VcmStar,
 }
 
+/// So many that stratified numbers last for a while.
+const MOST_CAMERA_PATHS: i64 = 4096;
+
 /// Settings of `vcm`.
 #[derive(Args, Clone, Debug, Serialize, Deserialize)]
 #[serde(default)]
@@ -37,6 +40,10 @@ pub struct VcmSettings {
     /// Exponent of the heuristic; anything but 1 with balance is refused
     #[arg(long, default_value_t = 1.0, value_name = "B")]
     pub beta: f64,
+    /// Camera paths a pixel and iteration; default one, and with Metropolis samplers about as many camera paths as light paths
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CAMERA_PATHS))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_paths: Option<u32>,
     /// One technique, with weight 1: for tests.
     #[arg(long, hide = true)]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,6 +60,7 @@ impl Default for VcmSettings {
             techniques: vec![TechniqueName::Vc, TechniqueName::Vm, TechniqueName::Lt],
             merge_weights: MergeWeightsName::Balance,
             beta: 1.0,
+            camera_paths: None,
             alone: None,
             photons: PhotonSettings::default(),
         }
@@ -116,8 +124,8 @@ impl Settings for VcmSettings {
         let settings = |message| MethodError::Settings { method: "vcm", message };
         self.check().map_err(settings)?;
         let (techniques, heuristic) = (self.set().map_err(settings)?, self.heuristic().map_err(settings)?);
-        let alone = self.alone;
-        Ok(Box::new(Engine::new(scene, size, common, techniques, heuristic, self.photons.clone(), alone)))
+        let (photons, camera_paths, alone) = (self.photons.clone(), self.camera_paths, self.alone);
+        Ok(Box::new(Engine::new(scene, size, common, EngineSettings { techniques, heuristic, photons, camera_paths, alone })))
     }
 }
 
@@ -132,6 +140,10 @@ pub struct BdptSettings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photons: Option<u64>,
+    /// Camera paths a pixel and iteration; default one, and with Metropolis samplers about as many camera paths as light paths
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CAMERA_PATHS))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_paths: Option<u32>,
     /// One technique, with weight 1: for tests.
     #[arg(long, hide = true)]
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -148,6 +160,8 @@ impl Settings for BdptSettings {
         let photons = PhotonSettings { sampler, photons: self.photons, chains, ..PhotonSettings::default() };
         let checked = photons.validate().and_then(|()| whole_mixture(&photons));
         checked.map_err(|message| MethodError::Settings { method: "bdpt", message })?;
-        Ok(Box::new(Engine::new(scene, size, common, Techniques::BDPT, Heuristic::default(), photons, self.alone)))
+        let (techniques, heuristic) = (Techniques::BDPT, Heuristic::default());
+        let (camera_paths, alone) = (self.camera_paths, self.alone);
+        Ok(Box::new(Engine::new(scene, size, common, EngineSettings { techniques, heuristic, photons, camera_paths, alone })))
     }
 }

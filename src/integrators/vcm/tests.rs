@@ -310,7 +310,12 @@ fn the_engine_weighs_paths_by_their_definition() {
         for (number, heuristic) in heuristics().into_iter().enumerate() {
             for techniques in [Techniques::VCM, Techniques::BDPT, Techniques::BPM] {
                 let photons = PhotonSettings { photons: Some(10_000), ..PhotonSettings::default() };
-                let mut engine = Engine::new(&scene, size, &COMMON, techniques, heuristic, photons, None);
+                let mut engine = Engine::new(
+                    &scene,
+                    size,
+                    &COMMON,
+                    EngineSettings { techniques, heuristic, photons, camera_paths: Some(3), alone: None },
+                );
                 engine.radius = f64::from(scene.bounding_sphere().1) * 2e-3;
                 let sampling = engine.sampling(0);
                 let weights = Weights::new(&sampling);

@@ -123,6 +123,8 @@ pub struct Sampling {
     pub heuristic: Heuristic,
     /// Light subpaths in the iteration, at least 1: each camera subpath connects to one of them, merges with all, and all of them splat.
     pub light_paths: f64,
+    /// Camera subpaths of a pixel in the iteration, at least 1.
+    pub camera_paths: f64,
     /// Radius of a merge, world units, positive.
     pub radius: f64,
 }

@@ -29,7 +29,8 @@ pub struct Weights<R> {
     techniques: Techniques,
     merge_weights: MergeWeights,
     exponent: Exponent<R>,
-    light_paths: R,
+    /// Light subpaths over a pixel's camera subpaths: the splats that compete with one sample of any other technique.
+    splats: R,
     /// Merge area times light paths; 0 where no merge is evaluated.
     merge_samples: R,
 }
@@ -51,7 +52,7 @@ impl<R: Float + 'static> Weights<R> {
                 2.0 => Exponent::Two,
                 _ => Exponent::Other(beta.as_()),
             },
-            light_paths: sampling.light_paths.as_(),
+            splats: (sampling.light_paths / sampling.camera_paths).as_(),
             merge_samples: merge_samples.as_(),
         }
     }
@@ -108,7 +109,7 @@ impl<R: Float + 'static> Weights<R> {
     /// The first vertex of a camera subpath. `pixel` is the density per steradian with which the camera makes rays through one given pixel.
     #[inline]
     pub fn from_camera(&self, pixel: R, edge: Edge<R>, share: R) -> Carried<R> {
-        let splats = self.light_paths * Self::on(self.techniques.light_tracing);
+        let splats = self.splats * Self::on(self.techniques.light_tracing);
         Carried { last: self.power(splats / (pixel * edge.ahead)), share, edges: 1, ..Self::nothing() }
     }
 
@@ -205,7 +206,7 @@ impl<R: Float + 'static> Weights<R> {
             return R::zero();
         }
         let (shares, count) = Self::so_far(light.carried);
-        let one = Connector { found: light.found / self.light_paths, ..*light };
+        let one = Connector { found: light.found / self.splats, ..*light };
         (R::one() + self.beyond(&one, self.common(shares, count))).recip()
     }
 

@@ -247,7 +247,7 @@ fn recursion_is_the_definition_on_real_paths() {
             count += 1;
             for techniques in SETS {
                 for heuristic in heuristics() {
-                    let sampling = Sampling { techniques, heuristic, light_paths: 1e5, radius };
+                    let sampling = Sampling { techniques, heuristic, light_paths: 1e5, camera_paths: 2.0, radius };
                     let defined = full.weights(&sampling);
                     let carried = drawn.recursion::<f32>(&sampling);
                     // What no walk makes, no walk weighs.
