@@ -1,23 +1,28 @@
-//! Values of small cubes of space that are computed when first asked for and then read with one load.
+//! Values of small cubes of space that are computed when first asked for and then read with two loads, one of which nearly always meets the
+//! processor's nearest cache.
 //!
-//! A value must depend on its cube alone. Then it does not matter which thread computes it, nor that two cubes that want the same slot push each
-//! other out: what is read is the same, bit by bit, as what would be computed.
+//! A value must depend on its cube alone. Then it does not matter which thread computes it, nor whether it is kept: what is read is the same,
+//! bit by bit, as what would be computed.
 
 use glam::IVec3;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 /// Bits of a cell's coordinate: cells 2^17 apart along an axis are one.
 const COORDINATE: u32 = 17;
-/// Bits of a cell's key.
-const KEY: u32 = 3 * COORDINATE;
-/// Odd, so that no two keys have the same product modulo 2^51.
+/// Cells of a block along an axis, as a power of two, and bits of a block's coordinate.
+const BLOCK: u32 = 2;
+const COARSE: u32 = COORDINATE - BLOCK;
+/// Bits of a block's key.
+const KEY: u32 = 3 * COARSE;
+/// Odd, so that no two keys have the same product modulo 2^45.
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Cubes of a cell: they share a line of the processor's cache.
+/// Cubes of a cell, and values of a block: 1 KiB.
 const CUBES: usize = 8;
-/// An entry is this bit, what of the key the line's number does not say, and 16 bits of the value.
-const FULL: u64 = 1 << 47;
-/// Fewest and most lines, as powers of two: 64 KiB and 16 MiB. The key's lower 47 bits have to tell apart what shares a line: 4 lines would do.
-const LINES: [u32; 2] = [10, 18];
+const VALUES: usize = CUBES << (3 * BLOCK);
+/// Fewest and most slots for blocks, as powers of two: 64 KiB and 64 MiB.
+const SLOTS: [u32; 2] = [6, 16];
+/// Slots that a block may lie in, one after another.
+const PROBES: usize = 4;
 
 /// The coordinates that are told apart, all others folded onto them.
 #[inline(always)]
@@ -26,58 +31,92 @@ pub(super) fn folded(cell: IVec3) -> IVec3 {
     (cell ^ (1 << (COORDINATE - 1))) & ((1 << COORDINATE) - 1)
 }
 
-/// Numbers of at least 1 and less than 2^32, kept with 11 bits after the first: within 2^-12 of themselves, 1 exactly.
+/// Numbers of at least 1 and less than 2^31, kept with 11 bits after the first: within 2^-12 of themselves, 1 exactly.
+///
+/// Values of a block of 64 cells lie together, those of four neighbours in one line of the cache: a surface meets few lines. A slot belongs to
+/// the first block that asks for it; blocks that find all of theirs taken are computed every time.
 #[derive(Debug)]
 pub(super) struct Memo {
-    entries: Vec<AtomicU64>,
-    /// Bits of a product below those that name the line.
+    /// One more than the block's key by slot; 0 where no block is.
+    blocks: Vec<AtomicU64>,
+    /// By slot; 0 where nothing has been computed.
+    values: Vec<AtomicU16>,
+    /// Bits of a product below those that name the slot.
     shift: u32,
 }
 
 impl Memo {
     /// Empty, for about so many cells in use.
     pub(super) fn new(cells: usize) -> Self {
-        let [fewest, most] = LINES;
-        let bits = (2 * cells.max(1)).next_power_of_two().ilog2().clamp(fewest, most);
-        let entries = std::iter::repeat_with(AtomicU64::default).take(CUBES << bits).collect();
-        Self { entries, shift: KEY - bits }
+        let [fewest, most] = SLOTS;
+        // A surface meets a quarter of a block's cells, more or less.
+        let bits = (cells / 8).max(1).next_power_of_two().ilog2().clamp(fewest, most);
+        let blocks = std::iter::repeat_with(AtomicU64::default).take(1 << bits).collect();
+        let values = std::iter::repeat_with(AtomicU16::default).take(VALUES << bits).collect();
+        Self { blocks, values, shift: KEY - bits }
     }
 
     /// The value of a cube of a [`folded`] cell: what `value` says of it, as exactly as it is kept.
     #[inline(always)]
     pub(super) fn get(&self, cell: IVec3, cube: usize, value: impl FnOnce() -> f32) -> f32 {
-        let [x, y, z] = cell.to_array().map(|c| c as u64);
-        let key = x | y << COORDINATE | z << (2 * COORDINATE);
-        let product = key.wrapping_mul(MIX) & ((1 << KEY) - 1);
-        let entry = &self.entries[(product >> self.shift) as usize * CUBES + cube];
-        let tag = product & (FULL - 1) | FULL;
-        let found = entry.load(Ordering::Relaxed);
-        if found >> 16 == tag {
-            return decode(found as u16);
+        let [x, y, z] = (cell >> BLOCK as i32).to_array().map(|c| c as u64);
+        let key = x | y << COARSE | z << (2 * COARSE);
+        let home = (key.wrapping_mul(MIX) & ((1 << KEY) - 1)) >> self.shift;
+        let Some(slot) = self.slot(home as usize, key + 1) else { return decode(encode(value())) };
+        let kept = &self.values[slot * VALUES + place(cell) * CUBES + cube];
+        let found = kept.load(Ordering::Relaxed);
+        if found != 0 {
+            return decode(found);
         }
         let code = encode(value());
-        entry.store(tag << 16 | u64::from(code), Ordering::Relaxed);
+        kept.store(code, Ordering::Relaxed);
         decode(code)
+    }
+
+    /// Where the block's values are kept. Once it has a slot nothing takes it away, so values need no order among threads.
+    #[inline(always)]
+    fn slot(&self, home: usize, block: u64) -> Option<usize> {
+        if self.blocks[home].load(Ordering::Relaxed) == block { Some(home) } else { self.claim(home, block) }
+    }
+
+    #[inline(never)]
+    fn claim(&self, home: usize, block: u64) -> Option<usize> {
+        (home..home + PROBES).map(|slot| slot & (self.blocks.len() - 1)).find(|&slot| {
+            let held = &self.blocks[slot];
+            match held.load(Ordering::Relaxed) {
+                0 => held.compare_exchange(0, block, Ordering::Relaxed, Ordering::Relaxed).map_or_else(|other| other == block, |_| true),
+                other => other == block,
+            }
+        })
     }
 
     /// Bytes held.
     #[cfg(test)]
     fn bytes(&self) -> usize {
-        size_of_val(&self.entries[..])
+        size_of_val(&self.blocks[..]) + size_of_val(&self.values[..])
     }
+}
+
+/// A cell's place in its block: neighbours along x and y next to each other, then along z, then pairs of them likewise.
+#[inline(always)]
+fn place(cell: IVec3) -> usize {
+    let [x, y, z] = cell.to_array().map(|c| c as usize);
+    let near = |bit: usize| (x >> bit & 1) | (y >> bit & 1) << 1 | (z >> bit & 1) << 2;
+    near(0) | near(1) << 3
 }
 
 /// Bits of 1.0.
 const ONE: u32 = 0x3f80_0000;
 
+/// Not 0.
 #[inline(always)]
 fn encode(value: f32) -> u16 {
-    ((value.to_bits() - ONE + (1 << 11)) >> 12) as u16
+    (((value.to_bits() - ONE + (1 << 11)) >> 12) + 1) as u16
 }
 
 #[inline(always)]
 fn decode(code: u16) -> f32 {
-    f32::from_bits(ONE + (u32::from(code) << 12))
+    f32::from_bits(ONE + (u32::from(code - 1) << 12))
 }
 
 #[cfg(test)]
@@ -99,9 +138,9 @@ mod tests {
         1.0 + (cell.x + 131 * cell.y + 17_161 * cell.z) as f32 + cube as f32 * 1e-3
     }
 
-    /// Far more cells than lines, at once and in any order: what comes back is what was computed, of the right cube.
+    /// Far more cells than there is room for, at once and in any order: what comes back is what was computed, of the right cube.
     #[test]
-    fn cubes_that_share_a_slot_are_not_mixed_up() {
+    fn blocks_that_want_the_same_slot_are_not_mixed_up() {
         let memo = Memo::new(1);
         let ask = |i: usize| {
             let cell = folded(IVec3::new(i as i32 % 130, i as i32 / 130 % 130, 7 * (i as i32 / 16_900) - 3));
@@ -110,7 +149,17 @@ mod tests {
         };
         (0..200_000).into_par_iter().for_each(ask);
         (0..200_000).into_par_iter().rev().for_each(ask);
-        assert_eq!(memo.bytes(), 64 << 10);
+        assert_eq!(memo.bytes(), (64 << 10) + 512);
+    }
+
+    /// Every cell of a block has values of its own, four neighbours in each line of the cache.
+    #[test]
+    fn cells_of_a_block_have_places_of_their_own() {
+        let cells = (0..64).map(|i| IVec3::new(i & 3, i >> 2 & 3, i >> 4));
+        let places: std::collections::BTreeSet<usize> = cells.map(place).collect();
+        assert_eq!(places.into_iter().collect::<Vec<_>>(), (0..64).collect::<Vec<_>>());
+        let near = [IVec3::new(4, 6, 9), IVec3::new(5, 6, 9), IVec3::new(4, 7, 9), IVec3::new(5, 7, 9)].map(|cell| place(cell) / 4);
+        assert!(near.iter().all(|line| *line == near[0]));
     }
 
     #[test]
@@ -125,6 +174,7 @@ mod tests {
                 });
             }
         }
+        // A hundred cells in some thirty blocks, nearly all of which find a slot.
         assert!((100..=130).contains(&computed), "{computed}");
     }
 

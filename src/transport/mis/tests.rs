@@ -264,8 +264,9 @@ fn heuristics() -> Vec<Heuristic> {
 
 fn sampling(s: &mut UniformStream, path: &Numbers, techniques: Techniques, heuristic: Heuristic) -> Sampling {
     let room = path.segments[0].distance2.sqrt();
-    let (light_paths, camera_paths) = (f64::from(size(s, 1.0, 1e6).round()), f64::from(size(s, 1.0, 50.0).round()));
-    Sampling { techniques, heuristic, light_paths, camera_paths, radius: f64::from(room * size(s, 1e-4, 0.1)) }
+    let (light_paths, radius) = (f64::from(size(s, 1.0, 1e6).round()), f64::from(room * size(s, 1e-4, 0.1)));
+    let camera_paths = f64::from(size(&mut stream(1_000_000 + path.segments.len() as u64), 1.0, 50.0).round());
+    Sampling { techniques, heuristic, light_paths, camera_paths, radius }
 }
 
 /// Largest relative error of a weight, and largest error of their sum. Weights below `tiny` must be as small in the recursion.
