@@ -4,7 +4,7 @@
 //! cost noise and never bias.
 
 use super::cells::{Cells, REGION_BUCKETS, floor};
-use super::memo::{Memo, folded};
+use super::memo::{Memo, folded, folded_half};
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -143,10 +143,8 @@ impl DensityMap {
             return 1.0;
         }
         // In half cells, from the centre of a cell: the eight nearest centres are the corners of the unit cube of cells that holds the point.
-        let half = floor((self.cells.scaled(p) + (OFFSET - 0.5)) * 2.0);
-        let (corner, inside) = (folded(half >> 1), half & 1);
-        let part = (inside.x | inside.y << 1 | inside.z << 2) as usize;
-        let count = filtered.get(corner, part, || self.count_around(corner, part));
+        let half = folded_half(floor((self.cells.scaled(p) + (OFFSET - 0.5)) * 2.0));
+        let count = filtered.get(half, || self.count_around(half));
         count * (area / (self.settings.cell * self.settings.cell * *passes as f32))
     }
 
@@ -158,7 +156,9 @@ impl DensityMap {
     /// Filtered count in an eighth of the cube whose corners are the centres of eight cells, rounding kept from going below 1; 1 where all eight are empty.
     #[cold]
     #[inline(never)]
-    fn count_around(&self, corner: IVec3, part: usize) -> f32 {
+    fn count_around(&self, half: IVec3) -> f32 {
+        let (corner, inside) = (half >> 1, half & 1);
+        let part = (inside.x | inside.y << 1 | inside.z << 2) as usize;
         let counts = i32x8::new(self.cells.buckets_of_eight(corner).map(|bucket| self.count(bucket as usize) as i32));
         let counts = f32x8::from_i32x8(counts);
         let weights = f32x8::new(DECAY[part]) & counts.simd_gt(f32x8::ZERO);

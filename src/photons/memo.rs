@@ -9,26 +9,36 @@ use std::sync::atomic::{AtomicU16, AtomicU64, Ordering};
 
 /// Bits of a cell's coordinate: cells 2^17 apart along an axis are one.
 const COORDINATE: u32 = 17;
-/// Cells of a block along an axis, as a power of two, and bits of a block's coordinate.
-const BLOCK: u32 = 2;
-const COARSE: u32 = COORDINATE - BLOCK;
+/// Half cells of a block along an axis, as a power of two, and bits of a block's coordinate.
+const BLOCK: u32 = 3;
+const COARSE: u32 = COORDINATE + 1 - BLOCK;
 /// Bits of a block's key.
 const KEY: u32 = 3 * COARSE;
 /// Odd, so that no two keys have the same product modulo 2^45.
 const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Cubes of a cell, and values of a block: 1 KiB.
-const CUBES: usize = 8;
-const VALUES: usize = CUBES << (3 * BLOCK);
+/// Values of a block, one a half cell: 1 KiB.
+const VALUES: usize = 1 << (3 * BLOCK);
 /// Fewest and most slots for blocks, as powers of two: 64 KiB and 64 MiB.
 const SLOTS: [u32; 2] = [6, 16];
 /// Slots that a block may lie in, one after another.
 const PROBES: usize = 4;
 
-/// The coordinates that are told apart, all others folded onto them.
+/// The coordinates of cells that are told apart, all others folded onto them.
 #[inline(always)]
 pub(super) fn folded(cell: IVec3) -> IVec3 {
+    fold::<COORDINATE>(cell)
+}
+
+/// The same for halves of cells.
+#[inline(always)]
+pub(super) fn folded_half(half: IVec3) -> IVec3 {
+    fold::<{ COORDINATE + 1 }>(half)
+}
+
+#[inline(always)]
+fn fold<const BITS: u32>(place: IVec3) -> IVec3 {
     // Half the range up, so that the fold is far from the origin: to change the highest bit that is kept is to add it.
-    (cell ^ (1 << (COORDINATE - 1))) & ((1 << COORDINATE) - 1)
+    (place ^ (1 << (BITS - 1))) & ((1 << BITS) - 1)
 }
 
 /// Numbers of at least 1 and less than 2^31, kept with 11 bits after the first: within 2^-12 of themselves, 1 exactly.
@@ -56,14 +66,14 @@ impl Memo {
         Self { blocks, values, shift: KEY - bits }
     }
 
-    /// The value of a cube of a [`folded`] cell: what `value` says of it, as exactly as it is kept.
+    /// The value of a half cell given by [`folded_half`]: what `value` says of it, as exactly as it is kept.
     #[inline(always)]
-    pub(super) fn get(&self, cell: IVec3, cube: usize, value: impl FnOnce() -> f32) -> f32 {
-        let [x, y, z] = (cell >> BLOCK as i32).to_array().map(|c| c as u64);
+    pub(super) fn get(&self, half: IVec3, value: impl FnOnce() -> f32) -> f32 {
+        let [x, y, z] = half.to_array().map(|c| (c >> BLOCK) as u64);
         let key = x | y << COARSE | z << (2 * COARSE);
         let home = (key.wrapping_mul(MIX) & ((1 << KEY) - 1)) >> self.shift;
         let Some(slot) = self.slot(home as usize, key + 1) else { return decode(encode(value())) };
-        let kept = &self.values[slot * VALUES + place(cell) * CUBES + cube];
+        let kept = &self.values[slot * VALUES + place(half)];
         let found = kept.load(Ordering::Relaxed);
         if found != 0 {
             return decode(found);
@@ -97,12 +107,15 @@ impl Memo {
     }
 }
 
-/// A cell's place in its block: neighbours along x and y next to each other, then along z, then pairs of them likewise.
+/// Three bits, two places apart.
+const SPREAD: [u16; 1 << BLOCK] = [0, 1, 8, 9, 64, 65, 72, 73];
+
+/// A half cell's place in its block: those of a cell next to each other, then those of its neighbours along x and y, then along z, then such
+/// pairs of cells likewise.
 #[inline(always)]
-fn place(cell: IVec3) -> usize {
-    let [x, y, z] = cell.to_array().map(|c| c as usize);
-    let near = |bit: usize| (x >> bit & 1) | (y >> bit & 1) << 1 | (z >> bit & 1) << 2;
-    near(0) | near(1) << 3
+fn place(half: IVec3) -> usize {
+    let [x, y, z] = half.to_array().map(|c| usize::from(SPREAD[c as usize & ((1 << BLOCK) - 1)]));
+    x | y << 1 | z << 2
 }
 
 /// Bits of 1.0.
@@ -133,33 +146,32 @@ mod tests {
         }
     }
 
-    /// A number that every cube has to itself.
-    fn of(cell: IVec3, cube: usize) -> f32 {
-        1.0 + (cell.x + 131 * cell.y + 17_161 * cell.z) as f32 + cube as f32 * 1e-3
+    /// A number that every half cell has to itself.
+    fn of(half: IVec3) -> f32 {
+        1.0 + (half.x + 263 * half.y + 69_169 * half.z) as f32 * 0.25
     }
 
-    /// Far more cells than there is room for, at once and in any order: what comes back is what was computed, of the right cube.
+    /// Far more cells than there is room for, at once and in any order: what comes back is what was computed, of the right half cell.
     #[test]
     fn blocks_that_want_the_same_slot_are_not_mixed_up() {
         let memo = Memo::new(1);
         let ask = |i: usize| {
-            let cell = folded(IVec3::new(i as i32 % 130, i as i32 / 130 % 130, 7 * (i as i32 / 16_900) - 3));
-            let cube = i % CUBES;
-            assert_eq!(memo.get(cell, cube, || of(cell - 65_536, cube)), decode(encode(of(cell - 65_536, cube))), "{cell} {cube}");
+            let half = IVec3::new(i as i32 % 260, i as i32 / 260 % 260, 7 * (i as i32 / 67_600));
+            assert_eq!(memo.get(folded_half(half), || of(half)), decode(encode(of(half))), "{half}");
         };
-        (0..200_000).into_par_iter().for_each(ask);
-        (0..200_000).into_par_iter().rev().for_each(ask);
+        (0..400_000).into_par_iter().for_each(ask);
+        (0..400_000).into_par_iter().rev().for_each(ask);
         assert_eq!(memo.bytes(), (64 << 10) + 512);
     }
 
-    /// Every cell of a block has values of its own, four neighbours in each line of the cache.
+    /// Every half cell of a block has a value of its own, those of four neighbouring cells in each line of the cache.
     #[test]
-    fn cells_of_a_block_have_places_of_their_own() {
-        let cells = (0..64).map(|i| IVec3::new(i & 3, i >> 2 & 3, i >> 4));
-        let places: std::collections::BTreeSet<usize> = cells.map(place).collect();
-        assert_eq!(places.into_iter().collect::<Vec<_>>(), (0..64).collect::<Vec<_>>());
-        let near = [IVec3::new(4, 6, 9), IVec3::new(5, 6, 9), IVec3::new(4, 7, 9), IVec3::new(5, 7, 9)].map(|cell| place(cell) / 4);
-        assert!(near.iter().all(|line| *line == near[0]));
+    fn half_cells_of_a_block_have_places_of_their_own() {
+        let halves = (0..512).map(|i| IVec3::new(i & 7, i >> 3 & 7, i >> 6));
+        let places: std::collections::BTreeSet<usize> = halves.map(place).collect();
+        assert_eq!(places.into_iter().collect::<Vec<_>>(), (0..512).collect::<Vec<_>>());
+        let near = (0..32).map(|i| place(IVec3::new(8 + (i & 3), 12 + (i >> 2 & 3), 18 + (i >> 4))) / 32);
+        assert!(near.collect::<std::collections::BTreeSet<_>>().len() == 1);
     }
 
     #[test]
@@ -168,7 +180,7 @@ mod tests {
         let mut computed = 0;
         for _ in 0..3 {
             for i in 0..100 {
-                memo.get(folded(IVec3::new(i, -i, 3)), 5, || {
+                memo.get(folded_half(IVec3::new(2 * i + 1, -2 * i, 7)), || {
                     computed += 1;
                     2.0
                 });
@@ -182,5 +194,9 @@ mod tests {
     fn far_cells_fold_onto_near_ones() {
         assert_eq!(folded(IVec3::new(-5, 0, 70_000)) - 65_536, IVec3::new(-5, 0, 70_000 - 131_072));
         assert!(folded(IVec3::new(i32::MIN, i32::MAX, -65_537)).cmpge(IVec3::ZERO).all());
+        // A half cell's cell is the half of it, folded or not.
+        for half in [IVec3::new(-7, 8, 3), IVec3::new(131_071, 131_072, -131_073), IVec3::new(i32::MIN, i32::MAX, 1 << 20)] {
+            assert_eq!(folded_half(half) >> 1, folded(half >> 1), "{half}");
+        }
     }
 }
