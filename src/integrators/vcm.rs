@@ -37,7 +37,7 @@ use light::{Batch, LightSide, Merging};
 use pyramid::Pyramid;
 use serde_json::{Value, json};
 
-pub use settings::{BdptSettings, MergeWeightsName, VcmSettings};
+pub use settings::{BdptSettings, MergeWeightsName, SharedSettings, VcmSettings};
 pub use technique::{Technique, TechniqueName};
 
 /// What the engine is told, whichever method asks.

@@ -153,7 +153,7 @@ fn merges_alone_on_a_glossy_path_are_the_path_tracer() {
 #[test]
 #[ignore = "minutes; run by .ci/run"]
 fn techniques_alone_by_chains_are_the_path_tracer() {
-    let sampler = ", \"sampler\": \"visibility\", \"rest\": \"never\", \"burn_in\": 200, \"photons\": 4000";
+    let sampler = ", \"sampler\": \"visibility\", \"rest\": \"never\", \"burn_in\": 200, \"photons\": 4000, \"camera_paths\": 1";
     pure(96, 0.1, sampler, |class, technique| ["LDE", "LDDE"].contains(&class) && !["vc0", "vc1"].contains(&technique));
 }
 
@@ -179,7 +179,9 @@ fn all_techniques_together_are_the_path_tracer() {
             ("vcm", vcm(", \"camera_paths\": 3")),
         ];
         // Chains at work: densities of light subpaths that weights are told of, and connections to paths that count for different amounts.
-        let chains = |sampler: &str| format!("\"sampler\": \"{sampler}\", \"rest\": \"never\", \"burn_in\": 100, \"photons\": 4000");
+        let chains = |sampler: &str| {
+            format!("\"sampler\": \"{sampler}\", \"rest\": \"never\", \"burn_in\": 100, \"photons\": 4000, \"camera_paths\": 4")
+        };
         let sampled = [("bdpt", format!("{{{}}}", chains("visibility"))), ("vcm", format!("{{\"radius\": 0.01, {}}}", chains("spatial")))];
         let cases = cases.into_iter().chain(sampled.into_iter().filter(|_| name == "lamp" || name == "point"));
         for (method, settings) in cases {

@@ -19,8 +19,9 @@ const SCENES: usize = 7;
 fn images(scene: &isophote::scene::mitsuba::LoadedScene, method: &str, sampler: &str, number: u64) -> Vec<Vec<Rgb>> {
     let alpha = if method == "bdpt" { "" } else { "\"alpha\": 1.0, " };
     let settings = format!("{{\"sampler\": \"{sampler}\", {alpha}\"photons\": 100000}}");
-    // Chains that rest would test nothing.
-    let settings = if sampler == "uniform" { settings } else { settings.replace('}', ", \"rest\": \"never\"}") };
+    // Chains that rest would test nothing. Bidirectional methods would trace as many camera subpaths as light subpaths: two a pixel.
+    let chains = if method == "sppm" { ", \"rest\": \"never\"}" } else { ", \"rest\": \"never\", \"camera_paths\": 2}" };
+    let settings = if sampler == "uniform" { settings } else { settings.replace('}', chains) };
     let base = common(0, scene.defaults.max_depth);
     let run = |seed| render(scene, method, &settings, &Common { seed: 100 * number + seed, ..base.clone() }, ITERATIONS).0;
     (1..=SEEDS).into_par_iter().map(run).collect()

@@ -207,7 +207,7 @@ impl Iteration<'_, '_> {
 mod tests {
     use super::*;
     use crate::integrators::photon_settings::{PhotonSettings, SamplerName};
-    use crate::integrators::vcm::{BdptSettings, MergeWeightsName, VcmSettings};
+    use crate::integrators::vcm::{BdptSettings, MergeWeightsName, SharedSettings, VcmSettings};
     use crate::integrators::{BoxedSettings, Common, MethodError};
     use crate::scene::Scene;
     use crate::scene::mitsuba::{LoadOptions, load};
@@ -237,7 +237,11 @@ mod tests {
     }
 
     fn star(alone: Option<Technique>) -> VcmSettings {
-        VcmSettings { merge_weights: MergeWeightsName::VcmStar, alone, ..VcmSettings::default() }
+        VcmSettings {
+            merge_weights: MergeWeightsName::VcmStar,
+            shared: SharedSettings { alone, ..SharedSettings::default() },
+            ..VcmSettings::default()
+        }
     }
 
     /// The layers whose name begins so.

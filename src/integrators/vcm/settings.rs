@@ -27,6 +27,20 @@ pub enum MergeWeightsName {
 /// So many that stratified numbers last for a while.
 const MOST_CAMERA_PATHS: i64 = 4096;
 
+/// What `vcm` and `bdpt` are told alike.
+#[derive(Args, Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SharedSettings {
+    /// Camera paths a pixel and iteration; default one, and with Metropolis samplers about as many camera paths as light paths
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CAMERA_PATHS))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera_paths: Option<u32>,
+    /// One technique, with weight 1: for tests.
+    #[arg(long, hide = true)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alone: Option<Technique>,
+}
+
 /// Settings of `vcm`.
 #[derive(Args, Clone, Debug, Serialize, Deserialize)]
 #[serde(default)]
@@ -40,14 +54,10 @@ pub struct VcmSettings {
     /// Exponent of the heuristic; anything but 1 with balance is refused
     #[arg(long, default_value_t = 1.0, value_name = "B")]
     pub beta: f64,
-    /// Camera paths a pixel and iteration; default one, and with Metropolis samplers about as many camera paths as light paths
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CAMERA_PATHS))]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub camera_paths: Option<u32>,
-    /// One technique, with weight 1: for tests.
-    #[arg(long, hide = true)]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub alone: Option<Technique>,
+    /// Options of both methods.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub shared: SharedSettings,
     /// Photon options.
     #[command(flatten)]
     #[serde(flatten)]
@@ -60,8 +70,7 @@ impl Default for VcmSettings {
             techniques: vec![TechniqueName::Vc, TechniqueName::Vm, TechniqueName::Lt],
             merge_weights: MergeWeightsName::Balance,
             beta: 1.0,
-            camera_paths: None,
-            alone: None,
+            shared: SharedSettings::default(),
             photons: PhotonSettings::default(),
         }
     }
@@ -124,7 +133,7 @@ impl Settings for VcmSettings {
         let settings = |message| MethodError::Settings { method: "vcm", message };
         self.check().map_err(settings)?;
         let (techniques, heuristic) = (self.set().map_err(settings)?, self.heuristic().map_err(settings)?);
-        let (photons, camera_paths, alone) = (self.photons.clone(), self.camera_paths, self.alone);
+        let (photons, SharedSettings { camera_paths, alone }) = (self.photons.clone(), self.shared.clone());
         Ok(Box::new(Engine::new(scene, size, common, EngineSettings { techniques, heuristic, photons, camera_paths, alone })))
     }
 }
@@ -140,14 +149,10 @@ pub struct BdptSettings {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=u64::from(u32::MAX)))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photons: Option<u64>,
-    /// Camera paths a pixel and iteration; default one, and with Metropolis samplers about as many camera paths as light paths
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_CAMERA_PATHS))]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub camera_paths: Option<u32>,
-    /// One technique, with weight 1: for tests.
-    #[arg(long, hide = true)]
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub alone: Option<Technique>,
+    /// Options of both methods.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub shared: SharedSettings,
     /// Options of Metropolis samplers.
     #[command(flatten)]
     #[serde(flatten)]
@@ -161,7 +166,7 @@ impl Settings for BdptSettings {
         let checked = photons.validate().and_then(|()| whole_mixture(&photons));
         checked.map_err(|message| MethodError::Settings { method: "bdpt", message })?;
         let (techniques, heuristic) = (Techniques::BDPT, Heuristic::default());
-        let (camera_paths, alone) = (self.camera_paths, self.alone);
+        let SharedSettings { camera_paths, alone } = self.shared.clone();
         Ok(Box::new(Engine::new(scene, size, common, EngineSettings { techniques, heuristic, photons, camera_paths, alone })))
     }
 }
