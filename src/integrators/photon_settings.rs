@@ -289,8 +289,8 @@ impl PhotonSettings {
         self.photons.unwrap_or(pixels.max(least))
     }
 
-    /// Camera subpaths a pixel that bidirectional methods trace in an iteration unless told otherwise: one, and with the least number of light
-    /// paths that chains have, on films of fewer pixels, as many as make both sides about equally many.
+    /// Camera subpaths a pixel that bidirectional methods trace in an iteration unless told otherwise: one, and with chains, where
+    /// light paths outnumber pixels, as many as make both sides about equally many.
     pub fn balanced_camera_paths(&self, size: (usize, usize)) -> usize {
         let pixels = (size.0 * size.1).max(1) as f64;
         match self.sampler {

@@ -72,7 +72,7 @@ struct Engine<'a> {
 impl<'a> Engine<'a> {
     fn new(scene: &'a Scene, size: (usize, usize), common: &Common, settings: EngineSettings) -> Self {
         let EngineSettings { techniques, heuristic, photons, camera_paths, alone } = settings;
-        let camera_paths = camera_paths.map_or_else(|| photons.balanced_camera_paths(size), |paths| paths.max(1) as usize);
+        let camera_paths = camera_paths.map_or_else(|| photons.balanced_camera_paths(size), |paths| paths as usize);
         let ladder = if techniques.merges { photons.ladder_of_one_radius() } else { photons.ladder() };
         let aimed = ladder.map(|ladder| Aimed::new(&photons, &ladder, common.seed));
         Self { scene, common: common.clone(), size, techniques, heuristic, photons, camera_paths, radius: 1.0, density: None, alone, aimed }

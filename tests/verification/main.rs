@@ -176,7 +176,7 @@ fn path_on_feature_scenes() {
 }
 
 #[test]
-#[ignore = "minutes; run by .ci/run"]
+#[ignore = "minutes; by hand, see docs/testing.md"]
 fn bdpt_on_feature_scenes() {
     feature_scenes("bdpt", "{}", 0.25);
 }

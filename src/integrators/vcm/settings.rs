@@ -41,6 +41,18 @@ pub struct SharedSettings {
     pub alone: Option<Technique>,
 }
 
+impl SharedSettings {
+    /// What the command line refuses by itself, for studies.
+    fn validate(&self) -> Result<(), String> {
+        match self.camera_paths {
+            Some(paths) if !(1..=MOST_CAMERA_PATHS).contains(&i64::from(paths)) => {
+                Err(format!("--camera-paths is {paths}: give 1 to {MOST_CAMERA_PATHS}, or leave it out"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Settings of `vcm`.
 #[derive(Args, Clone, Debug, Serialize, Deserialize)]
 #[serde(default)]
@@ -98,6 +110,7 @@ impl VcmSettings {
 
     fn check(&self) -> Result<(), String> {
         self.photons.validate()?;
+        self.shared.validate()?;
         whole_mixture(&self.photons)?;
         let asks_map = matches!(self.merge_weights, MergeWeightsName::VcmPlus | MergeWeightsName::VcmStar);
         if asks_map && self.photons.sampler != SamplerName::Uniform {
@@ -163,10 +176,24 @@ impl Settings for BdptSettings {
     fn build<'a>(&self, scene: &'a Scene, size: (usize, usize), common: &Common) -> Result<Box<dyn Integrator + 'a>, MethodError> {
         let (sampler, chains) = (self.sampler, self.chains.clone());
         let photons = PhotonSettings { sampler, photons: self.photons, chains, ..PhotonSettings::default() };
-        let checked = photons.validate().and_then(|()| whole_mixture(&photons));
+        let checked = photons.validate().and_then(|()| self.shared.validate()).and_then(|()| whole_mixture(&photons));
         checked.map_err(|message| MethodError::Settings { method: "bdpt", message })?;
         let (techniques, heuristic) = (Techniques::BDPT, Heuristic::default());
         let SharedSettings { camera_paths, alone } = self.shared.clone();
         Ok(Box::new(Engine::new(scene, size, common, EngineSettings { techniques, heuristic, photons, camera_paths, alone })))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn camera_paths_of_a_study_are_checked() {
+        for (paths, fine) in [(None, true), (Some(1), true), (Some(4096), true), (Some(0), false), (Some(4097), false)] {
+            let shared = SharedSettings { camera_paths: paths, alone: None };
+            assert_eq!(shared.validate().is_ok(), fine, "{paths:?}");
+            assert_eq!(VcmSettings { shared, ..VcmSettings::default() }.check().is_ok(), fine, "{paths:?}");
+        }
     }
 }
