@@ -6,16 +6,43 @@
 //! wherever the integrand has any structure in the first coordinates, and is never much larger where it has none.
 
 use crate::stream::{Key, Stream, UniformStream};
-use sobol_burley::{NUM_DIMENSION_SETS_4D, sample_4d};
+use sobol_burley::NUM_DIMENSION_SETS_4D;
+use sobol_burley::parts::{Int4, hash, hash_int4, owen_scramble_int4_rev, owen_scramble_rev, sobol_int4_rev};
+use std::sync::LazyLock;
 
 /// Iterations of one scramble: the generator has no more. The next as many are scrambled anew.
 const PERIOD: u64 = 1 << 16;
+
+/// Coordinates of points before they are scrambled: by set, for each four of the sixteen bits of a point's number and each value of the four. A point is
+/// the exclusive or of its bits' direction numbers; so four at a time are one load, where bit by bit they are a loop that nobody can foretell.
+static PARTS: LazyLock<Vec<[[[u32; 4]; 16]; 4]>> = LazyLock::new(|| {
+    let part = |set: u32, shift: usize, value: usize| <[u32; 4]>::from(sobol_int4_rev((value as u32) << (16 + 4 * shift), set));
+    let of_set = |set: u32| std::array::from_fn(|shift| std::array::from_fn(|value| part(set, shift, value)));
+    (0..NUM_DIMENSION_SETS_4D).map(of_set).collect()
+});
+
+/// What [`sobol_burley::sample_4d`] makes of a point's number, whichever coordinates it is asked for.
+#[inline(always)]
+fn shuffled(point: u32, scramble: u32) -> u32 {
+    owen_scramble_rev(point.reverse_bits(), hash(scramble ^ 0x79c6_8e4a))
+}
+
+/// The rest of [`sobol_burley::sample_4d`], bit for bit.
+#[inline(always)]
+fn scrambled(point: u32, set: u32, scramble: u32) -> [f32; 4] {
+    let parts = &PARTS[set as usize];
+    let part = |shift: usize| Int4::from(parts[shift][(point >> (16 + 4 * shift)) as usize & 15]);
+    let sobol = part(0) ^ part(1) ^ part(2) ^ part(3);
+    let own = Int4::from([scramble.wrapping_mul(0x9c8f_2d3b) ^ set; 4]) ^ [0x912f_69ba, 0x174f_18ab, 0x691e_72ca, 0xb40c_c1b8].into();
+    owen_scramble_int4_rev(sobol, hash_int4(own)).reverse_bits().to_f32_norm()
+}
 
 /// Coordinates of one iteration: a point of a Sobol' sequence with Owen's scrambling \[BURLEY20\]. The iteration of its key is the number of the point,
 /// all else chooses the scramble, so that streams that differ in anything but the iteration are independent. Every point by itself is uniform. Coordinates
 /// beyond the sequence's 256 are those of [`Key::stream`].
 #[derive(Clone, Debug)]
 pub struct StratifiedStream {
+    /// Number of the point after the scramble has put them in another order, bits reversed.
     point: u32,
     scramble: u32,
     /// The four coordinates of this number.
@@ -23,21 +50,24 @@ pub struct StratifiedStream {
     values: [f32; 4],
     /// The next of them; 4 if they are used up.
     next: usize,
-    beyond: UniformStream,
+    key: Key,
+    /// Where coordinates come from once the sequence has no more.
+    beyond: Option<UniformStream>,
 }
 
 impl Key {
     /// The stratified stream at this address.
     #[inline]
     pub fn stratified(self) -> StratifiedStream {
-        let period = Self { iteration: self.iteration / PERIOD, ..self };
+        let scramble = Self { iteration: self.iteration / PERIOD, ..self }.stream().bits();
         StratifiedStream {
-            point: (self.iteration % PERIOD) as u32,
-            scramble: period.stream().bits(),
+            point: shuffled((self.iteration % PERIOD) as u32, scramble),
+            scramble,
             set: 0,
             values: [0.0; 4],
             next: 4,
-            beyond: self.stream(),
+            key: self,
+            beyond: None,
         }
     }
 }
@@ -47,9 +77,9 @@ impl Stream for StratifiedStream {
     fn next_1d(&mut self) -> f32 {
         if self.next == self.values.len() {
             if self.set == NUM_DIMENSION_SETS_4D {
-                return self.beyond.next_1d();
+                return self.beyond.get_or_insert_with(|| self.key.stream()).next_1d();
             }
-            self.values = sample_4d(self.point, self.set, self.scramble);
+            self.values = scrambled(self.point, self.set, self.scramble);
             self.set += 1;
             self.next = 0;
         }
@@ -139,6 +169,18 @@ mod tests {
         let level = 1e-3 / tests.len() as f64;
         for (iteration, a, b, chi2) in tests {
             assert!(law.sf(chi2) > level, "iteration {iteration}, coordinates {a} and {b}: chi2 {chi2}");
+        }
+    }
+
+    #[test]
+    fn points_are_those_of_the_library() {
+        let mut s = key(0, 0).stream();
+        for point in (0..64).chain((64..PERIOD as u32).step_by(997)) {
+            let scramble = s.bits();
+            for set in 0..NUM_DIMENSION_SETS_4D {
+                let expected = sobol_burley::sample_4d(point, set, scramble);
+                assert_eq!(scrambled(shuffled(point, scramble), set, scramble), expected, "point {point}, set {set}");
+            }
         }
     }
 

@@ -14,6 +14,7 @@ mod light;
 mod pairing;
 mod pyramid;
 mod settings;
+mod shadows;
 mod technique;
 
 use super::aimed::Aimed;
@@ -135,7 +136,8 @@ impl<'a> Engine<'a> {
         let count = if self.shines() { self.light_paths() } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
-        let draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
+        let mut draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
+        iteration.finish(&mut draw.batches);
         stats.light_paths += draw.traced;
         draw.batches.iter().for_each(|batch| stats.count(&batch.tally));
         if self.techniques.light_tracing {

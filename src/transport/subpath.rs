@@ -20,6 +20,8 @@ pub struct SubpathVertex<'a> {
     pub hit: Hit,
     /// Ready to scatter; `None` where the sides of the arriving direction disagree, so that nothing but emission counts.
     pub point: Option<SurfacePoint<'a>>,
+    /// Has the surface there a lobe that is no delta, by which subpaths can be joined?
+    pub joins: bool,
     /// The vertex before: on the light, in the camera or on a surface.
     pub from: Endpoint,
     /// Unit direction of the ray that arrived.
@@ -81,7 +83,12 @@ impl<'a> Subpaths<'a, '_> {
     /// What a merge at the point counts for; 0 where none is evaluated.
     #[inline]
     pub fn share(&self, point: &SurfacePoint<'_>) -> f32 {
-        let merges = Lobes::Rough(self.roughness_threshold).admit(point.bsdf.max_roughness());
+        self.share_of(point, point.bsdf.max_roughness())
+    }
+
+    #[inline(always)]
+    fn share_of(&self, point: &SurfacePoint<'_>, max_roughness: f32) -> f32 {
+        let merges = Lobes::Rough(self.roughness_threshold).admit(max_roughness);
         if merges { self.weights.share(self.photons.map_or(1.0, |photons| photons(&point.end))) } else { 0.0 }
     }
 
@@ -110,7 +117,8 @@ impl<'a> Subpaths<'a, '_> {
                 return Some(Departure { d: ray.d, throughput, edges, last, letters });
             };
             let point = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d);
-            let share = point.as_ref().map_or(0.0, |point| self.share(point));
+            let max_roughness = point.as_ref().map_or(0.0, |point| point.bsdf.max_roughness());
+            let share = point.as_ref().map_or(0.0, |point| self.share_of(point, max_roughness));
             let carried = match (&last, first.take()) {
                 (Some((end, carried, scatter)), _) => {
                     let cosines = (ray.d.dot(end.n_g).abs(), ray.d.dot(hit.end.n_g).abs());
@@ -120,7 +128,7 @@ impl<'a> Subpaths<'a, '_> {
                 (None, Some(first)) => first(&hit, share),
                 (None, None) => return None,
             };
-            let vertex = SubpathVertex { hit, point, from, d: ray.d, throughput, carried, letters };
+            let vertex = SubpathVertex { hit, point, joins: max_roughness > 0.0, from, d: ray.d, throughput, carried, letters };
             if !visit(&vertex, stream, tally) {
                 return None;
             }

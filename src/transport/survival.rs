@@ -50,7 +50,10 @@ impl SurfacePoint<'_> {
             return None;
         }
         let (given, sampled) = (self.given_local, self.frame.to_local(w));
-        let (f, pdfs) = self.bsdf.eval_pdfs(self.uv, given, sampled, mode)?;
+        let (f, pdfs) = self.bsdf.eval_pdfs(self.uv, given, sampled, mode, Lobes::All);
+        if f.is_black() {
+            return None;
+        }
         let (fwd, rev) = with_survival(mode, f.max_component(), pdfs, self.square_index(given, sampled), [sampled.z, given.z]);
         Some(Met { f, fwd, rev })
     }

@@ -68,6 +68,7 @@ impl Engine<'_> {
         let deposits: Option<Vec<Deposits<()>>> = deposits.into_iter().collect();
         let sums = deposits.map(|deposits| collect(&deposits, &draw.scales, points.all().len()));
 
+        iteration.finish(&mut batches);
         let weights: Vec<Vec<f32>> = batches.par_iter_mut().map(|batch| batch.weigh(&draw.scales, count)).collect();
         batches.iter().for_each(|batch| stats.count(&batch.tally));
         if self.techniques.light_tracing {

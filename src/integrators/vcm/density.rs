@@ -1,5 +1,6 @@
 //! How densely photons lie, by the map that weights ask, where each pixel's camera subpath first merges: for `--aov density`.
 
+use super::eye::{TILE, Tile, TileMemory};
 use super::iteration::Iteration;
 use super::light::{LightSide, Merging};
 use super::pyramid::Recorder;
@@ -45,7 +46,7 @@ impl<R: Recorder> Recorder for Reading<'_, R> {
 }
 
 impl Iteration<'_, '_> {
-    /// A camera subpath a pixel into the film, with densities if it keeps readings. `start` makes what takes down a row, `finish` is given it, rows
+    /// A camera subpath a pixel into the film, with densities if it keeps readings. `start` makes what takes down a tile, `finish` is given it, tiles
     /// in order.
     pub(super) fn trace_reading<R: Recorder + Send>(
         &self,
@@ -59,11 +60,11 @@ impl Iteration<'_, '_> {
             return self.trace_recording(film, joined, stats, start, finish);
         };
         let start = || Reading { of: start(), map, pixel: 0, found: Vec::new() };
-        self.trace_recording(film, joined, stats, start, |row, stats| {
-            for (pixel, density) in row.found {
+        self.trace_recording(film, joined, stats, start, |tile, stats| {
+            for (pixel, density) in tile.found {
                 readings.add(0, pixel, f64::from(density) / self.light_paths);
             }
-            finish(row.of, stats);
+            finish(tile.of, stats);
         });
         film.keep_readings(readings);
     }
@@ -71,19 +72,19 @@ impl Iteration<'_, '_> {
     fn trace_recording<R: Recorder + Send>(
         &self,
         film: &mut Film,
-        Joined { light, merging, .. }: &Joined<'_>,
+        joined: &Joined<'_>,
         stats: &mut IterationStats,
         start: impl Fn() -> R + Sync,
         mut finish: impl FnMut(R, &mut IterationStats),
     ) {
-        let sample = |(tally, record): &mut (Tally, R), x: usize, y: usize| self.pixel(x, y, light, *merging, tally, record);
-        film.add_eye_samples(
-            || (Tally::default(), start()),
-            sample,
-            |(tally, record)| {
-                stats.count(&tally);
-                finish(record, stats);
-            },
-        );
+        let sample = |memory: &mut TileMemory, pixels: &[usize], values: &mut [Rgb]| {
+            let mut tile = Tile { tally: Tally::default(), record: start(), memory };
+            self.tile(pixels, values, joined, &mut tile);
+            (tile.tally, tile.record)
+        };
+        film.add_eye_tiles(TILE, TileMemory::default, sample, |(tally, record)| {
+            stats.count(&tally);
+            finish(record, stats);
+        });
     }
 }

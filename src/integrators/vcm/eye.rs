@@ -1,16 +1,20 @@
 //! The camera's side: a pixel's subpaths, and everything they are joined with.
 
+use super::density::Joined;
 use super::iteration::Iteration;
-use super::light::{LightSide, LightVertex, Merging};
+use super::light::{LightVertex, Merging};
 use super::pyramid::Recorder;
+use super::shadows::Shadows;
 use super::technique::Technique;
 use crate::math::Rgb;
 use crate::photons::Search;
 use crate::samplers::{Key, Purpose, Stream};
+use crate::scene::Scene;
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraRay;
 use crate::scene::emitter::DirectSample;
 use crate::scene::hit::Hit;
+use crate::scene::ray::Ray;
 use crate::transport::class::Letters;
 use crate::transport::merge::{accepts, cosine_ratio};
 use crate::transport::mis::{Carried, Connector, Edge, LightEnd};
@@ -20,60 +24,105 @@ use crate::transport::survival::Met;
 use crate::transport::walk::{Tally, beyond_emitters};
 use glam::{Vec2, Vec3};
 
-impl<'a> Iteration<'a, '_> {
-    /// What a pixel's camera subpaths find, their mean.
-    pub(super) fn pixel<R: Recorder>(
-        &self,
-        x: usize,
-        y: usize,
-        light: &LightSide,
-        merging: Option<&Merging>,
-        tally: &mut Tally,
-        record: &mut R,
-    ) -> Rgb {
-        let number = y * self.size.0 + x;
-        record.start(number);
-        (0..self.camera_paths).map(|path| self.camera_subpath((x, y), path, light, merging, tally, record)).sum()
+/// Light that reaches a pixel of a tile if the edge it came by is free.
+struct Unshadowed {
+    /// The pixel's place in its tile.
+    place: u32,
+    edges: u32,
+    technique: Technique,
+    value: Rgb,
+    /// With weight 1.
+    all: Rgb,
+}
+
+/// Width and height, in pixels, of the tile whose edges are traced together.
+pub(super) const TILE: [usize; 2] = [64, 4];
+
+/// Memory of a tile, used again for the next.
+#[derive(Default)]
+pub(super) struct TileMemory {
+    shadows: Shadows<Unshadowed>,
+    /// What reached each pixel by edges that are free.
+    lit: Vec<Rgb>,
+}
+
+/// What the camera subpaths of a tile leave, beside its colours.
+pub(super) struct Tile<'m, R> {
+    pub(super) tally: Tally,
+    pub(super) record: R,
+    pub(super) memory: &'m mut TileMemory,
+}
+
+impl<R: Recorder> Tile<'_, R> {
+    /// A path of so many edges to the pixel at `place`, if nothing is on `ray`; `value` says what it brings with the technique's weight.
+    #[inline(always)]
+    fn join(&mut self, place: u32, ray: impl FnOnce() -> Ray, edges: u32, technique: Technique, weight: f32, value: impl Fn(f32) -> Rgb) {
+        let weighted = value(weight);
+        let all = if R::ON { value(1.0) } else { weighted };
+        if !all.is_black() {
+            self.tally.rays += 1;
+            self.memory.shadows.push(ray(), Unshadowed { place, edges, technique, value: weighted, all });
+        }
     }
 
-    /// What subpath number `path` of a pixel's adds to that mean.
-    fn camera_subpath<R: Recorder>(
-        &self,
-        (x, y): (usize, usize),
-        path: usize,
-        light: &LightSide,
-        merging: Option<&Merging>,
-        tally: &mut Tally,
-        record: &mut R,
-    ) -> Rgb {
-        let number = y * self.size.0 + x;
+    fn light_up(&mut self, scene: &Scene) {
+        let Self { tally, record, memory: TileMemory { shadows, lit } } = self;
+        shadows.trace(scene, |Unshadowed { place, edges, technique, value, all }| {
+            record.add(edges, technique, value, all);
+            lit[place as usize] += tally.finite(value);
+        });
+    }
+}
+
+impl<'a> Iteration<'a, '_> {
+    /// What the camera subpaths of a tile's pixels find, for each pixel their mean.
+    pub(super) fn tile<R: Recorder>(&self, pixels: &[usize], values: &mut [Rgb], joined: &Joined<'_>, tile: &mut Tile<'_, R>) {
+        let scene = self.subpaths.scene;
+        tile.memory.lit.clear();
+        tile.memory.lit.resize(pixels.len(), Rgb::BLACK);
+        for (place, (&pixel, value)) in pixels.iter().zip(values.iter_mut()).enumerate() {
+            tile.record.start(pixel);
+            *value = (0..self.camera_paths).map(|path| self.camera_subpath((pixel, place as u32), path, joined, tile)).sum();
+            // Records are kept pixel by pixel.
+            if R::ON || tile.memory.shadows.is_full() {
+                tile.light_up(scene);
+            }
+        }
+        tile.light_up(scene);
+        values.iter_mut().zip(&tile.memory.lit).for_each(|(value, lit)| *value += *lit);
+    }
+
+    /// What subpath number `path` of a pixel's adds to that mean; light that may be shadowed is left to the tile.
+    fn camera_subpath<R: Recorder>(&self, (pixel, place): (usize, u32), path: usize, joined: &Joined<'_>, tile: &mut Tile<'_, R>) -> Rgb {
+        let Joined { light, merging, .. } = joined;
+        let (x, y) = (pixel % self.size.0, pixel / self.size.0);
         let of_all = self.index * self.camera_paths as u64 + path as u64;
-        let mut stream = Key { seed: self.common.seed, iteration: of_all, index: number as u64, purpose: Purpose::Camera }.stratified();
+        let mut stream = Key { seed: self.common.seed, iteration: of_all, index: pixel as u64, purpose: Purpose::Camera }.stratified();
         let film = Vec2::new(x as f32, y as f32) + Vec2::from(stream.next_2d());
         let lens = Vec2::from(stream.next_2d());
         let seen = self.subpaths.scene.camera().ray(film, lens);
         let mut ray = seen.ray;
         if self.common.hide_emitters {
-            ray = beyond_emitters(self.subpaths.scene, ray, tally).0;
+            ray = beyond_emitters(self.subpaths.scene, ray, &mut tile.tally).0;
         }
         let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE * (1.0 / self.camera_paths as f32) };
-        let partner = if self.techniques.connections { light.partner(number * self.camera_paths + path) } else { None };
-        let (mut sum, mut search) = (Rgb::BLACK, Search::default());
-        let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, tally, first, |vertex, stream, tally| {
+        let partner = if self.techniques.connections { light.partner(pixel * self.camera_paths + path) } else { None };
+        let (mut sum, mut search, mut walked) = (Rgb::BLACK, Search::default(), Tally::default());
+        let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, &mut walked, first, |vertex, stream, _| {
             if vertex.hit.emitter.is_some() {
-                sum += tally.finite(self.hit(vertex, record));
+                let found = self.hit(vertex, &mut tile.record);
+                sum += tile.tally.finite(found);
             }
             let goes_on = vertex.carried.edges < self.depths.max;
-            if let Some(point) = vertex.point.filter(|point| goes_on && point.bsdf.max_roughness() > 0.0) {
+            if let Some(point) = vertex.point.filter(|_| goes_on && vertex.joins) {
                 // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
                 let merging = merging.filter(|_| vertex.carried.share > 0.0);
                 if let Some(merging) = merging {
                     merging.store.grid().search(&mut search, point.end.p, self.radius);
                 }
                 if self.techniques.connections {
-                    let found = self.next_event(vertex, &point, stream, tally, record);
-                    sum += tally.finite(found);
+                    self.next_event(vertex, &point, stream, (tile, place));
                 }
                 if let Some(merging) = merging {
                     merging.store.grid().approach(&mut search);
@@ -82,23 +131,24 @@ impl<'a> Iteration<'a, '_> {
                 let mut find = || sought.take().map(|merging| merging.store.find(&mut search));
                 if let Some(partner) = &partner {
                     for (end, letters) in partner.vertices() {
-                        let found = self.connect(vertex, &point, (end, letters, partner.factor), tally, record);
-                        sum += tally.finite(found);
+                        self.connect(vertex, &point, (end, letters, partner.factor), (tile, place));
                         find();
                     }
                 }
                 find();
                 if let Some(merging) = merging {
-                    record.merges_at(&point.end);
-                    let found = self.merge(vertex, &point, (merging, &search), record);
-                    sum += tally.finite(found);
+                    tile.record.merges_at(&point.end);
+                    let found = self.merge(vertex, &point, (merging, &search), &mut tile.record);
+                    sum += tile.tally.finite(found);
                 }
             }
             goes_on
         });
         if let Some(departure) = departure {
-            sum += tally.finite(self.escape(&departure, record));
+            let found = self.escape(&departure, &mut tile.record);
+            sum += tile.tally.finite(found);
         }
+        tile.tally.add(&walked);
         sum
     }
 
@@ -160,32 +210,24 @@ impl<'a> Iteration<'a, '_> {
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
         stream: &mut S,
-        tally: &mut Tally,
-        record: &mut R,
-    ) -> Rgb {
+        (tile, place): (&mut Tile<'_, R>, u32),
+    ) {
         let scene = self.subpaths.scene;
         let (u_emitter, u) = (stream.next_1d(), Vec2::from(stream.next_2d()));
-        if !self.depths.contains(vertex.carried.edges + 1) {
-            return Rgb::BLACK;
+        let edges = vertex.carried.edges + 1;
+        if !self.depths.contains(edges) {
+            return;
         }
-        let Some(sample) = scene.sample_direct(point.end.p, u_emitter, u) else { return Rgb::BLACK };
-        let Some(met) = point.meet(Mode::Radiance, sample.wi) else { return Rgb::BLACK };
+        let Some(sample) = scene.sample_direct(point.end.p, u_emitter, u) else { return };
+        let Some(met) = point.meet(Mode::Radiance, sample.wi) else { return };
         let cos = point.cosine(Mode::Radiance, sample.wi);
         let weight = self.next_event_weight(&vertex.carried, point, &sample, &met);
         let way = (point, Mode::Radiance, sample.wi);
         let class = self.common.paths.as_ref().map(|pattern| self.one_event(pattern, Letters::default(), way, vertex.letters));
         let with = |weight: f32| in_class(vertex.throughput * met.f * sample.radiance * (weight * cos / sample.pdf.0), class);
-        let value = with(self.weigh(Technique::Connection(1), weight));
-        let all = if R::ON { with(1.0) } else { value };
-        if all.is_black() {
-            return all;
-        }
-        tally.rays += 1;
-        if !scene.visible(&point.end, &sample) {
-            return Rgb::BLACK;
-        }
-        record.add(vertex.carried.edges + 1, Technique::Connection(1), value, all);
-        value
+        // Nothing can be between points that coincide, or on a ray without a direction.
+        let ray = || scene.shadow_ray(&point.end, &sample).unwrap_or(Ray { o: point.end.p, d: Vec3::ZERO, t_max: 0.0 });
+        tile.join(place, ray, edges, Technique::Connection(1), self.weigh(Technique::Connection(1), weight), with);
     }
 
     pub(super) fn next_event_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, sample: &DirectSample, met: &Met) -> f32 {
@@ -199,15 +241,14 @@ impl<'a> Iteration<'a, '_> {
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
         (partner, letters, factor): (&LightVertex, Letters, f32),
-        tally: &mut Tally,
-        record: &mut R,
-    ) -> Rgb {
+        (tile, place): (&mut Tile<'_, R>, u32),
+    ) {
         let edges = vertex.carried.edges + partner.carried.edges + 1;
         if !self.depths.contains(edges) {
-            return Rgb::BLACK;
+            return;
         }
         let other = partner.point(self.subpaths.scene);
-        let Some(Joint { w, distance2, here, there }) = Joint::new(point, &other) else { return Rgb::BLACK };
+        let Some(Joint { w, distance2, here, there }) = Joint::new(point, &other) else { return };
         let weight = self.connection_weight(&vertex.carried, point, partner, &Joint { w, distance2, here, there });
         let cosines = point.cosine(Mode::Radiance, w) * other.cosine(Mode::Importance, -w);
         let ways = [(&other, Mode::Importance, -w), (point, Mode::Radiance, w)];
@@ -215,17 +256,7 @@ impl<'a> Iteration<'a, '_> {
         let with =
             |weight: f32| in_class(vertex.throughput * here.f * there.f * partner.flux * (weight * factor * cosines / distance2), class);
         let technique = Technique::Connection(partner.carried.edges + 1);
-        let value = with(self.weigh(technique, weight));
-        let all = if R::ON { with(1.0) } else { value };
-        if all.is_black() {
-            return all;
-        }
-        tally.rays += 1;
-        if self.subpaths.scene.occluded(&point.end, &partner.end) {
-            return Rgb::BLACK;
-        }
-        record.add(edges, technique, value, all);
-        value
+        tile.join(place, || point.end.segment(&partner.end), edges, technique, self.weigh(technique, weight), with);
     }
 
     pub(super) fn connection_weight(&self, carried: &Carried<f32>, point: &SurfacePoint<'a>, partner: &LightVertex, joint: &Joint) -> f32 {

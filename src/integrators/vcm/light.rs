@@ -4,15 +4,17 @@ use super::eye::in_class;
 use super::iteration::Iteration;
 use super::pairing::Pairing;
 use super::pyramid::RecordedSplat;
+use super::shadows::Shadows;
 use super::technique::Technique;
 use crate::image::film::Splat;
 use crate::math::{Frame, Rgb, fetch};
 use crate::photons::Store;
 use crate::samplers::{Drawn, Key, LightPathSpace, Purpose, Stream};
-use crate::scene::ShapeId;
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraConnection;
 use crate::scene::hit::Endpoint;
+use crate::scene::ray::Ray;
+use crate::scene::{Scene, ShapeId};
 use crate::targets::shares::Shares;
 use crate::targets::{Arrival, Arrivals};
 use crate::transport::class::Letters;
@@ -118,7 +120,7 @@ impl LightPathSpace for Iteration<'_, '_> {
         // One more edge joins a vertex to the camera's side; a merge vertex counts its edges in 16 bits.
         let most = self.depths.max.saturating_sub(1).min(u32::from(u16::MAX));
         self.subpaths.walk(Mode::Importance, start, stream, tally, first, |vertex, _, _| {
-            if let Some(point) = vertex.point.filter(|point| point.bsdf.max_roughness() > 0.0) {
+            if let Some(point) = vertex.point.filter(|_| vertex.joins) {
                 vertices.push(LightVertex::new(vertex, &point));
                 if self.subpaths.classes {
                     letters.push(vertex.letters);
@@ -144,13 +146,40 @@ pub(super) struct Batch {
     splats: Vec<Splat>,
     /// The same by length, with weights and without; empty unless images of techniques are kept.
     pub(super) recorded: Vec<RecordedSplat>,
-    /// What paths count for, and where each one's splats end: nothing of independent paths, which all count the same.
-    shares: Shares,
+    /// Where each path's splats end.
     splat_ends: Vec<u32>,
+    /// Splats of which it is not yet known whether the camera sees where they come from.
+    waiting: Shadows<Waiting>,
+    /// What paths count for: nothing of independent paths, which all count the same.
+    shares: Shares,
     pub(super) tally: Tally,
 }
 
+/// A splat if nothing is in its way.
+#[derive(Debug)]
+struct Waiting {
+    /// The path's number in its batch.
+    path: u32,
+    splat: Splat,
+    edges: u32,
+    /// With weight 1.
+    all: Rgb,
+}
+
 impl Batch {
+    /// Keeps the splats that the camera sees, by length as well if images of techniques are `recorded`.
+    fn trace_splats(&mut self, scene: &Scene, recorded: bool) {
+        let Self { splats, splat_ends, waiting, tally, recorded: by_length, .. } = self;
+        waiting.trace(scene, |Waiting { path, splat, edges, all }| {
+            splat_ends.resize((path as usize).max(splat_ends.len()), splats.len() as u32);
+            let value = tally.finite(splat.value);
+            splats.push(Splat { value, ..splat });
+            if recorded {
+                by_length.push(RecordedSplat { pixel: splat.pixel, edges, weighted: value, unweighted: all });
+            }
+        });
+    }
+
     /// Makes every path count for what a sampler with targets says, relative to one of `count` independent paths: splats and the flux of
     /// vertices are multiplied by it. Returns these factors.
     pub(super) fn weigh(&mut self, scales: &[f64], count: u64) -> Vec<f32> {
@@ -194,6 +223,8 @@ impl LightSide {
         for batch in &mut batches {
             // What is in the film is done with.
             batch.splats = Vec::new();
+            batch.splat_ends = Vec::new();
+            batch.waiting = Shadows::default();
             batch.recorded = Vec::new();
             firsts.push(paths);
             paths += batch.ends.len();
@@ -320,7 +351,14 @@ impl Iteration<'_, '_> {
         }
         self.connect_and_keep(batch, path, drawn);
         batch.shares.add(drawn);
-        batch.splat_ends.push(batch.splats.len() as u32);
+    }
+
+    /// The last step of all batches, before anything is asked of them: their splats are complete.
+    pub(super) fn finish(&self, batches: &mut [Batch]) {
+        batches.par_iter_mut().for_each(|batch| {
+            batch.trace_splats(self.subpaths.scene, self.records);
+            batch.splat_ends.resize(batch.ends.len(), batch.splats.len() as u32);
+        });
     }
 
     #[inline(always)]
@@ -333,6 +371,9 @@ impl Iteration<'_, '_> {
                 let lens = stream.as_mut().map_or(Vec2::ZERO, |stream| Vec2::from(stream.next_2d()));
                 let letters = path.letters.get(i).copied().unwrap_or_default();
                 self.splat(vertex, letters, lens, batch);
+            }
+            if batch.waiting.is_full() {
+                batch.trace_splats(self.subpaths.scene, self.records);
             }
         }
         if self.keeps_vertices() {
@@ -362,16 +403,13 @@ impl Iteration<'_, '_> {
         let with = |weight: f32| in_class(vertex.flux * met.f * (cosine * density * weight), class);
         let value = with(weight);
         let all = if self.records { with(1.0) } else { value };
-        if all.is_black() || !self.camera_sees(vertex, &connection, &mut batch.tally) {
+        if all.is_black() {
             return;
         }
+        let Some(ray) = self.line_of_sight(vertex, &connection, &mut batch.tally) else { return };
         let (x, y) = (connection.film.x as usize, connection.film.y as usize);
-        let pixel = (y * self.size.0 + x) as u32;
-        let value = batch.tally.finite(value);
-        batch.splats.push(Splat { pixel, value });
-        if self.records {
-            batch.recorded.push(RecordedSplat { pixel, edges, weighted: value, unweighted: all });
-        }
+        let splat = Splat { pixel: (y * self.size.0 + x) as u32, value };
+        batch.waiting.push(ray, Waiting { path: batch.ends.len() as u32, splat, edges, all });
     }
 
     /// Weight of a light vertex connected to the camera.
@@ -381,20 +419,20 @@ impl Iteration<'_, '_> {
         self.subpaths.weights.splat(&Connector { carried: &vertex.carried, rev: met.rev, found })
     }
 
-    /// Is nothing between a light vertex and the camera that the camera does not look through?
-    fn camera_sees(&self, vertex: &LightVertex, connection: &CameraConnection, tally: &mut Tally) -> bool {
+    /// The ray that is free if and only if the camera sees a light vertex, but for what it looks through. `None` where that hides the vertex.
+    fn line_of_sight(&self, vertex: &LightVertex, connection: &CameraConnection, tally: &mut Tally) -> Option<Ray> {
         let scene = self.subpaths.scene;
         tally.rays += 1;
         if !self.common.hide_emitters {
-            return scene.camera_sees(&vertex.end, connection);
+            return Some(vertex.end.segment(&connection.near));
         }
-        // The camera's first edge passes emitters, and shows none.
+        // The camera's first edge passes emitters, and shows none: asked here and now, and then of a ray that meets nothing.
         let shines = |shape: ShapeId| scene.shapes().get(shape.0 as usize).is_some_and(|shape| shape.emitter.is_some());
         let mut ray = connection.near.segment(&vertex.end);
         loop {
             match scene.intersect(&ray) {
-                None => return !shines(vertex.shape),
-                Some(hit) if hit.emitter.is_none() => return false,
+                None => return (!shines(vertex.shape)).then_some(Ray { t_max: 0.0, ..ray }),
+                Some(hit) if hit.emitter.is_none() => return None,
                 Some(hit) => {
                     tally.rays += 1;
                     ray = hit.end.segment(&vertex.end);

@@ -172,7 +172,7 @@ fn all(it: &Iteration<'_, '_>, pair: &Pair<'_>, s: &mut UniformStream) -> Vec<Ma
             let places = reversed(camera.before(i));
             list.push(made(it, Technique::Connection(0), it.hit_weight(vertex), lens, &PathLight::Surface(vertex.hit), &places));
         }
-        let Some(point) = vertex.point.filter(|point| point.bsdf.max_roughness() > 0.0) else { continue };
+        let Some(point) = vertex.point.filter(|_| vertex.joins) else { continue };
         let here = || {
             let mut places = camera.before(i);
             places.push(ends_here(&vertex.hit));
@@ -193,7 +193,7 @@ fn all(it: &Iteration<'_, '_>, pair: &Pair<'_>, s: &mut UniformStream) -> Vec<Ma
         }
         let Some(source) = &pair.source else { continue };
         for (j, partner) in light.vertices.iter().enumerate() {
-            let Some(other) = partner.point.filter(|other| other.bsdf.max_roughness() > 0.0) else { continue };
+            let Some(other) = partner.point.filter(|_| partner.joins) else { continue };
             let Some(joint) = Joint::new(&point, &other) else { continue };
             let stored = LightVertex::new(partner, &other);
             let technique = Technique::Connection(partner.carried.edges + 1);
@@ -219,7 +219,7 @@ fn all(it: &Iteration<'_, '_>, pair: &Pair<'_>, s: &mut UniformStream) -> Vec<Ma
     }
     let Some(source) = &pair.source else { return list };
     for (j, vertex) in light.vertices.iter().enumerate() {
-        let Some(point) = vertex.point.filter(|point| point.bsdf.max_roughness() > 0.0) else { continue };
+        let Some(point) = vertex.point.filter(|_| vertex.joins) else { continue };
         let lens = pair_lens(s);
         let Some(connection) = scene.camera().connect(&point.end, lens) else { continue };
         let Some(met) = point.meet(Mode::Importance, connection.wo) else { continue };

@@ -53,6 +53,14 @@ impl Blend {
         (f1.lerp(f2, weight), pdf1 * (1.0 - p) + pdf2 * p)
     }
 
+    #[inline]
+    pub(super) fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, [f32; 2]) {
+        let (weight, p) = self.shares(uv, lobes);
+        let (f1, pdfs1) = self.first.eval_pdfs(uv, given, sampled, mode, lobes);
+        let (f2, pdfs2) = self.second.eval_pdfs(uv, given, sampled, mode, lobes);
+        (f1.lerp(f2, weight), [0, 1].map(|i| pdfs1[i] * (1.0 - p) + pdfs2[i] * p))
+    }
+
     pub(super) fn sample(&self, uv: Vec2, given: Vec3, mode: Mode, lobes: Lobes, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let (weight, p) = self.shares(uv, lobes);
         // ## Choose, and use what is left of the number again
@@ -70,10 +78,10 @@ impl Blend {
         }
         // ## The other one may answer with the same direction
         let cos = s.w.z.abs();
-        let (f, pdf) = other.eval_pdf(uv, given, s.w, mode, lobes);
+        let (f, [pdf, pdf_rev]) = other.eval_pdfs(uv, given, s.w, mode, lobes);
         let value = s.weight * (s.pdf_fwd * share) + f * (cos * other_share);
         s.pdf_fwd = s.pdf_fwd * p + pdf * (1.0 - p);
-        s.pdf_rev = s.pdf_rev * p + other.pdf(uv, s.w, given, lobes) * (1.0 - p);
+        s.pdf_rev = s.pdf_rev * p + pdf_rev * (1.0 - p);
         s.weight = value / s.pdf_fwd;
         s.if_not_black()
     }

@@ -277,18 +277,32 @@ impl Bsdf {
         }
     }
 
-    /// The value of all lobes that are no deltas, with the density of `sampled` given `given` and that with the roles exchanged: as
-    /// [`Bsdf::eval_pdf`] and [`Bsdf::pdf`] say them. `None` where the value is black.
+    /// [`Bsdf::eval_pdf`], and beside the density of `sampled` given `given` that with the roles exchanged, as [`Bsdf::pdf`] says it.
     #[inline(always)]
-    pub fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode) -> Option<(Rgb, [f32; 2])> {
+    pub fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, mode: Mode, lobes: Lobes) -> (Rgb, [f32; 2]) {
         let (b, side) = self.facing(given);
-        if let Bsdf::Diffuse(b) = b {
-            let (given, sampled) = (turned(given, side), turned(sampled, side));
-            let (f, pdf) = b.eval_pdf(uv, given, sampled, mode, Lobes::All);
-            return (!f.is_black()).then(|| (f, [pdf, b.pdf(uv, sampled, given, Lobes::All)]));
+        let (given, sampled) = (turned(given, side), turned(sampled, side));
+        match b {
+            Bsdf::Diffuse(b) => {
+                let (f, pdf) = b.eval_pdf(uv, given, sampled, mode, lobes);
+                (f, [pdf, b.pdf(uv, sampled, given, lobes)])
+            }
+            _ => b.eval_pdfs_any(uv, &given, &sampled, mode, lobes),
         }
-        let (f, pdf) = self.eval_pdf_any(uv, &given, &sampled, mode, Lobes::All);
-        (!f.is_black()).then(|| (f, [pdf, self.pdf(uv, sampled, given, Lobes::All)]))
+    }
+
+    /// [`Bsdf::eval_pdfs`] out of line. Materials have an answer of their own where value and densities share what takes time.
+    #[inline(never)]
+    fn eval_pdfs_any(&self, uv: Vec2, given: &Vec3, sampled: &Vec3, mode: Mode, lobes: Lobes) -> (Rgb, [f32; 2]) {
+        match self {
+            Bsdf::RoughConductor(b) => b.eval_pdfs(uv, *given, *sampled, lobes),
+            Bsdf::Phong(b) => b.eval_pdfs(uv, *given, *sampled, lobes),
+            Bsdf::Blend(b) => b.eval_pdfs(uv, *given, *sampled, mode, lobes),
+            b => {
+                let (f, pdf) = dispatch!(b, b => b.eval_pdf(uv, *given, *sampled, mode, lobes));
+                (f, [pdf, b.pdf(uv, *sampled, *given, lobes)])
+            }
+        }
     }
 
     /// [`Bsdf::eval_pdf`] out of line: the commonest material is worth a place in every loop, all of them are not.

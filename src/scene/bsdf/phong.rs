@@ -73,12 +73,18 @@ impl Phong {
 
     #[inline]
     pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, _mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        let (f, [pdf, _]) = self.eval_pdfs(uv, given, sampled, lobes);
+        (f, pdf)
+    }
+
+    #[inline(always)]
+    pub(super) fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> (Rgb, [f32; 2]) {
         if given.z <= 0.0 || sampled.z <= 0.0 {
-            return (Rgb::BLACK, 0.0);
+            return (Rgb::BLACK, [0.0; 2]);
         }
-        let Some(local) = self.local(uv, lobes) else { return (Rgb::BLACK, 0.0) };
+        let Some(local) = self.local(uv, lobes) else { return (Rgb::BLACK, [0.0; 2]) };
         let lobe = self.lobe(given, sampled);
-        (self.value(&local, lobe), self.density(&local, lobe, sampled.z))
+        (self.value(&local, lobe), [sampled.z, given.z].map(|cos| self.density(&local, lobe, cos)))
     }
 
     #[inline]

@@ -53,14 +53,20 @@ impl RoughConductor {
 
     #[inline]
     pub(super) fn eval_pdf(&self, uv: Vec2, given: Vec3, sampled: Vec3, _mode: Mode, lobes: Lobes) -> (Rgb, f32) {
+        let (f, [pdf, _]) = self.eval_pdfs(uv, given, sampled, lobes);
+        (f, pdf)
+    }
+
+    #[inline(always)]
+    pub(super) fn eval_pdfs(&self, uv: Vec2, given: Vec3, sampled: Vec3, lobes: Lobes) -> (Rgb, [f32; 2]) {
         if self.blocked(given, sampled, lobes) {
-            return (Rgb::BLACK, 0.0);
+            return (Rgb::BLACK, [0.0; 2]);
         }
         let h = (given + sampled).normalize();
         let (m, cos_h) = (&self.distribution, given.dot(h));
-        let (d, g) = (m.d(h), m.shadowing(given));
-        let f = self.fresnel(uv, cos_h.clamp(0.0, 1.0)) * (0.25 * d * g.value * m.shadowing(sampled).value);
-        (f, m.reflection_pdf(g, h, cos_h, d))
+        let (d, g, g_sampled) = (m.d(h), m.shadowing(given), m.shadowing(sampled));
+        let f = self.fresnel(uv, cos_h.clamp(0.0, 1.0)) * (0.25 * d * g.value * g_sampled.value);
+        (f, [m.reflection_pdf(g, h, cos_h, d), m.reflection_pdf(g_sampled, h, sampled.dot(h), d)])
     }
 
     #[inline]

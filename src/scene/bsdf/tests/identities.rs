@@ -54,6 +54,9 @@ fn samples_report_what_value_and_density_say() {
                     assert!(all_close(x.weight, f * (x.w.z.abs() / fwd), t), "{tag} but f {f:?} density {fwd}");
                     let (f2, fwd2) = b.eval_pdf(UV, given, x.w, mode, lobes);
                     assert!(all_close(f, f2, 1e-3) && close(fwd, fwd2, 1e-3), "{tag} but {f:?} {f2:?} {fwd} {fwd2}");
+                    let (f3, [fwd3, rev3]) = b.eval_pdfs(UV, given, x.w, mode, lobes);
+                    assert_eq!((f3, fwd3), (f2, fwd2), "{tag}");
+                    assert!(close(rev, rev3, 1e-3), "{tag} but {rev} {rev3}");
                 }
             }
         }
@@ -248,6 +251,7 @@ fn degenerate_input_gives_finite_numbers() {
                     let (f, pdf) = b.eval_pdf(UV, given, other, MODES[0], lobes);
                     assert!(f.is_finite() && f.at_least(0.0) == f, "{name} {given} {other}: {f:?}");
                     assert!(pdf.is_finite() && pdf >= 0.0, "{name} {given} {other}: {pdf}");
+                    assert!(b.eval_pdfs(UV, given, other, MODES[0], lobes).1.iter().all(|pdf| pdf.is_finite() && *pdf >= 0.0));
                     assert!(b.eval(UV, given, other, lobes).is_finite() && b.pdf(UV, given, other, lobes).is_finite());
                 }
             }
