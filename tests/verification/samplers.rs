@@ -79,7 +79,7 @@ fn agree(file: PathBuf, size: (u32, u32), method: &str, samplers: &[&str], base:
 macro_rules! own {
     ($($test:ident: $scene:literal, $base:literal;)*) => {$(
         #[test]
-        #[ignore = "minutes; run by .ci/run, villa by hand"]
+        #[ignore = "minutes; hall and canyon run by .ci/run, the others by hand"]
         fn $test() {
             samplers_agree(root().join("scenes").join($scene).join("scene.xml"), (96, 72), $base);
         }
