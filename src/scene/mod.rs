@@ -16,7 +16,7 @@ pub mod texture;
 use crate::math::{Rgb, SolidAnglePdf};
 use accel::Accel;
 use bsdf::Bsdf;
-use camera::{Camera, CameraConnection, CameraError, FilmSpec};
+use camera::{Camera, CameraError, FilmSpec};
 use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Emitter, EmitterKind, Emitters, LightPoint};
 use glam::{Vec2, Vec3};
 use hit::{Endpoint, Hit};
@@ -226,12 +226,6 @@ impl Scene {
             EmitterKind::Surface | EmitterKind::DeltaPosition => Some(from.segment(&sample.end)).filter(|segment| segment.d != Vec3::ZERO),
             EmitterKind::DeltaDirection | EmitterKind::Infinite => Some(from.ray(sample.wi)),
         }
-    }
-
-    /// Can the camera see the point that a connection was made from?
-    #[inline]
-    pub fn camera_sees(&self, from: &Endpoint, connection: &CameraConnection) -> bool {
-        !self.occluded(from, &connection.near)
     }
 
     /// A light sample as seen from `from`, emitters chosen by power; `u_pick` chooses the emitter, `u` the point on it. `None` if the light

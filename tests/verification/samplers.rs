@@ -114,7 +114,7 @@ foreign! {
 macro_rules! bidirectional {
     ($($test:ident: $method:literal, $scene:literal;)*) => {$(
         #[test]
-        #[ignore = "minutes; run by .ci/run"]
+        #[ignore = "minutes; run by .ci/run, glass-box by hand"]
         fn $test() {
             let file = root().join("scenes").join($scene).join("scene.xml");
             agree(file, (96, 72), $method, &["visibility", "spatial"], "uniform", 4);
