@@ -45,6 +45,36 @@ pub struct Start {
     pub throughput: Rgb,
 }
 
+/// A subpath between two vertices.
+#[derive(Clone, Copy, Debug)]
+pub struct Walk {
+    ray: Ray,
+    from: Endpoint,
+    throughput: Rgb,
+    last: Option<(Endpoint, Carried<f32>, Scatter<f32>)>,
+    letters: Letters,
+}
+
+impl Walk {
+    /// On its first edge.
+    pub fn new(start: Start) -> Self {
+        let Start { ray, from, throughput } = start;
+        Self { ray, from, throughput, last: None, letters: Letters::default() }
+    }
+
+    /// The ray along its edge; unit direction.
+    pub fn ray(&self) -> &Ray {
+        &self.ray
+    }
+
+    /// What it is when its edge meets nothing.
+    pub fn departure(&self) -> Departure {
+        let Self { ray, throughput, last, letters, .. } = *self;
+        let edges = 1 + last.map_or(0, |(_, carried, _)| carried.edges);
+        Departure { d: ray.d, throughput, edges, last, letters }
+    }
+}
+
 /// A subpath that left the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Departure {
@@ -106,56 +136,61 @@ impl<'a> Subpaths<'a, '_> {
         first: impl FnOnce(&Hit, f32) -> Carried<f32>,
         mut visit: impl FnMut(&SubpathVertex<'a>, &mut S, &mut Tally) -> bool,
     ) -> Option<Departure> {
-        let Start { mut ray, mut from, mut throughput } = start;
+        let mut walk = Walk::new(start);
         let mut first = Some(first);
-        let mut last: Option<(Endpoint, Carried<f32>, Scatter<f32>)> = None;
-        let mut letters = Letters::default();
         loop {
             tally.rays += 1;
-            let Some(hit) = self.scene.intersect(&ray) else {
-                let edges = 1 + last.map_or(0, |(_, carried, _)| carried.edges);
-                return Some(Departure { d: ray.d, throughput, edges, last, letters });
-            };
-            let point = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d);
-            let max_roughness = point.as_ref().map_or(0.0, |point| point.bsdf.max_roughness());
-            let share = point.as_ref().map_or(0.0, |point| self.share_of(point, max_roughness));
-            let carried = match (&last, first.take()) {
-                (Some((end, carried, scatter)), _) => {
-                    let cosines = (ray.d.dot(end.n_g).abs(), ray.d.dot(hit.end.n_g).abs());
-                    let edge = Edge::between(cosines.0, cosines.1, end.p.distance_squared(hit.end.p));
-                    self.weights.extend(carried, *scatter, edge, share)
-                }
-                (None, Some(first)) => first(&hit, share),
-                (None, None) => return None,
-            };
-            let vertex = SubpathVertex { hit, point, joins: max_roughness > 0.0, from, d: ray.d, throughput, carried, letters };
-            if !visit(&vertex, stream, tally) {
+            let Some(hit) = self.scene.intersect(&walk.ray) else { return Some(walk.departure()) };
+            let vertex = self.reach(&walk, hit, |hit, share| first.take().map(|first| first(hit, share)))?;
+            if !visit(&vertex, stream, tally) || !self.go_on(mode, &mut walk, &vertex, stream, tally) {
                 return None;
             }
-            let Some(point) = point else {
-                tally.sides_disagree += 1;
-                return None;
-            };
-
-            // The next direction.
-            let u_lobe = stream.next_1d();
-            let u = Vec2::from(stream.next_2d());
-            let u_survive = stream.next_1d();
-            let onward = point.scatter(mode, u_lobe, u, u_survive)?;
-            throughput *= onward.weight;
-            if self.classes {
-                let (letter, factor) = event(&point, mode, &onward.scatter, onward.d, stream);
-                letters = letters.then(letter);
-                throughput *= factor;
-            }
-            if !throughput.is_finite() {
-                tally.non_finite += 1;
-                return None;
-            }
-            from = point.end;
-            last = Some((from, carried, onward.scatter));
-            ray = from.ray(onward.d);
         }
+    }
+
+    /// The vertex where a walk has met a surface; `first` as with [`Subpaths::walk`], asked at the first vertex alone. `None` if it has no answer.
+    #[inline(always)]
+    pub fn reach(&self, walk: &Walk, hit: Hit, first: impl FnOnce(&Hit, f32) -> Option<Carried<f32>>) -> Option<SubpathVertex<'a>> {
+        let Walk { ray, from, throughput, last, letters } = *walk;
+        let point = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d);
+        let max_roughness = point.as_ref().map_or(0.0, |point| point.bsdf.max_roughness());
+        let share = point.as_ref().map_or(0.0, |point| self.share_of(point, max_roughness));
+        let carried = match &last {
+            Some((end, carried, scatter)) => {
+                let cosines = (ray.d.dot(end.n_g).abs(), ray.d.dot(hit.end.n_g).abs());
+                let edge = Edge::between(cosines.0, cosines.1, end.p.distance_squared(hit.end.p));
+                self.weights.extend(carried, *scatter, edge, share)
+            }
+            None => first(&hit, share)?,
+        };
+        Some(SubpathVertex { hit, point, joins: max_roughness > 0.0, from, d: ray.d, throughput, carried, letters })
+    }
+
+    /// The next edge of a walk that is at `vertex`; false where it ends. Coordinates as with [`Subpaths::walk`].
+    #[inline(always)]
+    pub fn go_on<S: Stream>(&self, mode: Mode, walk: &mut Walk, vertex: &SubpathVertex<'a>, stream: &mut S, tally: &mut Tally) -> bool {
+        let Some(point) = vertex.point else {
+            tally.sides_disagree += 1;
+            return false;
+        };
+        let u_lobe = stream.next_1d();
+        let u = Vec2::from(stream.next_2d());
+        let u_survive = stream.next_1d();
+        let Some(onward) = point.scatter(mode, u_lobe, u, u_survive) else { return false };
+        walk.throughput *= onward.weight;
+        if self.classes {
+            let (letter, factor) = event(&point, mode, &onward.scatter, onward.d, stream);
+            walk.letters = walk.letters.then(letter);
+            walk.throughput *= factor;
+        }
+        if !walk.throughput.is_finite() {
+            tally.non_finite += 1;
+            return false;
+        }
+        walk.from = point.end;
+        walk.last = Some((point.end, vertex.carried, onward.scatter));
+        walk.ray = point.end.ray(onward.d);
+        true
     }
 }
 

@@ -29,7 +29,7 @@ struct Reading<'d, R> {
 }
 
 impl<R: Recorder> Recorder for Reading<'_, R> {
-    const ON: bool = R::ON;
+    const ON: bool = true;
     #[inline(always)]
     fn add(&mut self, edges: u32, technique: Technique, weighted: Rgb, unweighted: Rgb) {
         self.of.add(edges, technique, weighted, unweighted);
@@ -69,15 +69,15 @@ impl Iteration<'_, '_> {
         film.keep_readings(readings);
     }
 
-    fn trace_recording<R: Recorder + Send>(
-        &self,
+    fn trace_recording<'t, R: Recorder + Send>(
+        &'t self,
         film: &mut Film,
-        joined: &Joined<'_>,
+        joined: &'t Joined<'t>,
         stats: &mut IterationStats,
         start: impl Fn() -> R + Sync,
         mut finish: impl FnMut(R, &mut IterationStats),
     ) {
-        let sample = |memory: &mut TileMemory, pixels: &[usize], values: &mut [Rgb]| {
+        let sample = |memory: &mut TileMemory<'t>, pixels: &[usize], values: &mut [Rgb]| {
             let mut tile = Tile { tally: Tally::default(), record: start(), memory };
             self.tile(pixels, values, joined, &mut tile);
             (tile.tally, tile.record)

@@ -2,24 +2,24 @@
 
 use super::density::Joined;
 use super::iteration::Iteration;
-use super::light::{LightVertex, Merging};
+use super::light::{LightSide, LightVertex, Merging, Partner};
 use super::pyramid::Recorder;
 use super::shadows::Shadows;
 use super::technique::Technique;
 use crate::math::Rgb;
 use crate::photons::Search;
-use crate::samplers::{Key, Purpose, Stream};
+use crate::samplers::{Key, Purpose, StratifiedStream, Stream};
 use crate::scene::Scene;
 use crate::scene::bsdf::Mode;
 use crate::scene::camera::CameraRay;
 use crate::scene::emitter::DirectSample;
 use crate::scene::hit::Hit;
-use crate::scene::ray::Ray;
+use crate::scene::ray::{RawHit, Ray};
 use crate::transport::class::Letters;
 use crate::transport::merge::{accepts, cosine_ratio};
 use crate::transport::mis::{Carried, Connector, Edge, LightEnd};
 use crate::transport::shading::SurfacePoint;
-use crate::transport::subpath::{Departure, Start, SubpathVertex};
+use crate::transport::subpath::{Departure, Start, SubpathVertex, Walk};
 use crate::transport::survival::Met;
 use crate::transport::walk::{Tally, beyond_emitters};
 use glam::{Vec2, Vec3};
@@ -38,22 +38,54 @@ struct Unshadowed {
 /// Width and height, in pixels, of the tile whose edges are traced together.
 pub(super) const TILE: [usize; 2] = [64, 4];
 
+/// A camera subpath under way.
+struct Walker<'a> {
+    /// Its pixel's place in the tile.
+    place: u32,
+    stream: StratifiedStream,
+    seen: CameraRay,
+    walk: Walk,
+    /// The last vertex it reached.
+    vertex: Option<SubpathVertex<'a>>,
+    partner: Option<Partner<'a>>,
+    /// What it brought, without light that may be shadowed.
+    sum: Rgb,
+}
+
+/// Numbers of the subpaths that walk, of those whose vertex is joined to light, and of those that merge there; rays of the first, and
+/// what they hit.
+#[derive(Default)]
+struct Waves {
+    walking: Vec<u32>,
+    joining: Vec<u32>,
+    merging: Vec<u32>,
+    rays: Vec<Ray>,
+    hits: Vec<Option<RawHit>>,
+    /// A search a subpath.
+    searches: Vec<Search>,
+}
+
+/// Camera subpaths that go together. As many have rays enough for packets, and what they keep stays near the processor.
+const TOGETHER: usize = 64;
+
 /// Memory of a tile, used again for the next.
 #[derive(Default)]
-pub(super) struct TileMemory {
+pub(super) struct TileMemory<'a> {
+    walkers: Vec<Walker<'a>>,
+    waves: Waves,
     shadows: Shadows<Unshadowed>,
     /// What reached each pixel by edges that are free.
     lit: Vec<Rgb>,
 }
 
 /// What the camera subpaths of a tile leave, beside its colours.
-pub(super) struct Tile<'m, R> {
+pub(super) struct Tile<'m, 'a, R> {
     pub(super) tally: Tally,
     pub(super) record: R,
-    pub(super) memory: &'m mut TileMemory,
+    pub(super) memory: &'m mut TileMemory<'a>,
 }
 
-impl<R: Recorder> Tile<'_, R> {
+impl<R: Recorder> Tile<'_, '_, R> {
     /// A path of so many edges to the pixel at `place`, if nothing is on `ray`; `value` says what it brings with the technique's weight.
     #[inline(always)]
     fn join(&mut self, place: u32, ray: impl FnOnce() -> Ray, edges: u32, technique: Technique, weight: f32, value: impl Fn(f32) -> Rgb) {
@@ -66,7 +98,7 @@ impl<R: Recorder> Tile<'_, R> {
     }
 
     fn light_up(&mut self, scene: &Scene) {
-        let Self { tally, record, memory: TileMemory { shadows, lit } } = self;
+        let Self { tally, record, memory: TileMemory { shadows, lit, .. } } = self;
         shadows.trace(scene, |Unshadowed { place, edges, technique, value, all }| {
             record.add(edges, technique, value, all);
             lit[place as usize] += tally.finite(value);
@@ -76,15 +108,23 @@ impl<R: Recorder> Tile<'_, R> {
 
 impl<'a> Iteration<'a, '_> {
     /// What the camera subpaths of a tile's pixels find, for each pixel their mean.
-    pub(super) fn tile<R: Recorder>(&self, pixels: &[usize], values: &mut [Rgb], joined: &Joined<'_>, tile: &mut Tile<'_, R>) {
+    ///
+    /// [`TOGETHER`] subpaths go one edge at a time, and at their vertices one technique at a time: rays are traced together, photons are
+    /// asked for long before they are needed, and the processor keeps to one piece of the program. Every pixel's sums have the order they
+    /// would have if its subpaths went alone.
+    pub(super) fn tile<R: Recorder>(&self, pixels: &[usize], values: &mut [Rgb], joined: &Joined<'a>, tile: &mut Tile<'_, 'a, R>) {
         let scene = self.subpaths.scene;
         tile.memory.lit.clear();
         tile.memory.lit.resize(pixels.len(), Rgb::BLACK);
-        for (place, (&pixel, value)) in pixels.iter().zip(values.iter_mut()).enumerate() {
-            tile.record.start(pixel);
-            *value = (0..self.camera_paths).map(|path| self.camera_subpath((pixel, place as u32), path, joined, tile)).sum();
-            // Records are kept pixel by pixel.
-            if R::ON || tile.memory.shadows.is_full() {
+        values.fill(Rgb::BLACK);
+        // Records are kept pixel by pixel.
+        let together = if R::ON { 1 } else { TOGETHER };
+        for (number, (pixels, values)) in pixels.chunks(together).zip(values.chunks_mut(together)).enumerate() {
+            tile.record.start(pixels[0]);
+            for path in 0..self.camera_paths {
+                self.camera_subpaths((number * together, pixels), path, values, joined, tile);
+            }
+            if R::ON {
                 tile.light_up(scene);
             }
         }
@@ -92,9 +132,41 @@ impl<'a> Iteration<'a, '_> {
         values.iter_mut().zip(&tile.memory.lit).for_each(|(value, lit)| *value += *lit);
     }
 
-    /// What subpath number `path` of a pixel's adds to that mean; light that may be shadowed is left to the tile.
-    fn camera_subpath<R: Recorder>(&self, (pixel, place): (usize, u32), path: usize, joined: &Joined<'_>, tile: &mut Tile<'_, R>) -> Rgb {
-        let Joined { light, merging, .. } = joined;
+    /// Adds what subpath number `path` of each pixel brings to that mean; light that may be shadowed is left to the tile.
+    fn camera_subpaths<R: Recorder>(
+        &self,
+        (place, pixels): (usize, &[usize]),
+        path: usize,
+        values: &mut [Rgb],
+        joined: &Joined<'a>,
+        tile: &mut Tile<'_, 'a, R>,
+    ) {
+        let mut walkers = std::mem::take(&mut tile.memory.walkers);
+        walkers.clear();
+        for (i, &pixel) in pixels.iter().enumerate() {
+            walkers.push(self.start((pixel, (place + i) as u32), path, joined.light, &mut tile.tally));
+        }
+        let mut waves = std::mem::take(&mut tile.memory.waves);
+        waves.walking.clear();
+        waves.walking.extend(0..walkers.len() as u32);
+        waves.searches.resize(walkers.len().max(waves.searches.len()), Search::default());
+        while !waves.walking.is_empty() {
+            self.advance(&mut walkers, &mut waves, tile);
+            self.join(&mut walkers, &mut waves, joined, tile);
+            waves.walking.retain(|&i| {
+                let Walker { walk, vertex, stream, .. } = &mut walkers[i as usize];
+                vertex.as_ref().is_some_and(|vertex| {
+                    let goes_on = vertex.carried.edges < self.depths.max;
+                    goes_on && self.subpaths.go_on(Mode::Radiance, walk, vertex, stream, &mut tile.tally)
+                })
+            });
+        }
+        values.iter_mut().zip(&walkers).for_each(|(value, walker)| *value += walker.sum);
+        (tile.memory.walkers, tile.memory.waves) = (walkers, waves);
+    }
+
+    /// A camera subpath on its first edge.
+    fn start(&self, (pixel, place): (usize, u32), path: usize, light: &'a LightSide, tally: &mut Tally) -> Walker<'a> {
         let (x, y) = (pixel % self.size.0, pixel / self.size.0);
         let of_all = self.index * self.camera_paths as u64 + path as u64;
         let mut stream = Key { seed: self.common.seed, iteration: of_all, index: pixel as u64, purpose: Purpose::Camera }.stratified();
@@ -103,53 +175,91 @@ impl<'a> Iteration<'a, '_> {
         let seen = self.subpaths.scene.camera().ray(film, lens);
         let mut ray = seen.ray;
         if self.common.hide_emitters {
-            ray = beyond_emitters(self.subpaths.scene, ray, &mut tile.tally).0;
+            ray = beyond_emitters(self.subpaths.scene, ray, tally).0;
         }
-        let first = |hit: &Hit, share: f32| self.seen(&seen, hit, share);
         let start = Start { ray, from: seen.end, throughput: Rgb::WHITE * (1.0 / self.camera_paths as f32) };
         let partner = if self.techniques.connections { light.partner(pixel * self.camera_paths + path) } else { None };
-        let (mut sum, mut search, mut walked) = (Rgb::BLACK, Search::default(), Tally::default());
-        let departure = self.subpaths.walk(Mode::Radiance, start, &mut stream, &mut walked, first, |vertex, stream, _| {
+        Walker { place, stream, seen, walk: Walk::new(start), vertex: None, partner, sum: Rgb::BLACK }
+    }
+
+    /// Takes all that walk to the ends of their edges; those that leave the scene walk no more.
+    fn advance<R: Recorder>(&self, walkers: &mut [Walker<'a>], waves: &mut Waves, tile: &mut Tile<'_, 'a, R>) {
+        let scene = self.subpaths.scene;
+        let Waves { walking, rays, hits, .. } = waves;
+        rays.clear();
+        rays.extend(walking.iter().map(|&i| *walkers[i as usize].walk.ray()));
+        hits.clear();
+        hits.resize(rays.len(), None);
+        scene.trace_each(rays, hits);
+        tile.tally.rays += rays.len() as u64;
+        let mut ends = rays.iter().zip(hits.iter());
+        walking.retain(|&i| {
+            let walker = &mut walkers[i as usize];
+            let Some((ray, Some(raw))) = ends.next() else {
+                let found = self.escape(&walker.walk.departure(), &mut tile.record);
+                walker.sum += tile.tally.finite(found);
+                return false;
+            };
+            let seen = &walker.seen;
+            walker.vertex = self.subpaths.reach(&walker.walk, scene.hit(ray, raw), |hit, share| Some(self.seen(seen, hit, share)));
+            true
+        });
+    }
+
+    /// What is found at the vertices where subpaths are.
+    fn join<R: Recorder>(&self, walkers: &mut [Walker<'a>], waves: &mut Waves, joined: &Joined<'a>, tile: &mut Tile<'_, 'a, R>) {
+        let scene = self.subpaths.scene;
+        let Waves { walking, joining, merging, searches, .. } = waves;
+        joining.clear();
+        merging.clear();
+        // Emitters, and the cells around.
+        for &i in walking.iter() {
+            let Walker { vertex: Some(vertex), sum, .. } = &mut walkers[i as usize] else { continue };
             if vertex.hit.emitter.is_some() {
                 let found = self.hit(vertex, &mut tile.record);
-                sum += tile.tally.finite(found);
+                *sum += tile.tally.finite(found);
             }
-            let goes_on = vertex.carried.edges < self.depths.max;
-            if let Some(point) = vertex.point.filter(|_| goes_on && vertex.joins) {
-                // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
-                let merging = merging.filter(|_| vertex.carried.share > 0.0);
-                if let Some(merging) = merging {
-                    merging.store.grid().search(&mut search, point.end.p, self.radius);
-                }
-                if self.techniques.connections {
-                    self.next_event(vertex, &point, stream, (tile, place));
-                }
-                if let Some(merging) = merging {
-                    merging.store.grid().approach(&mut search);
-                }
-                let mut sought = merging;
-                let mut find = || sought.take().map(|merging| merging.store.find(&mut search));
-                if let Some(partner) = &partner {
-                    for (end, letters) in partner.vertices() {
-                        self.connect(vertex, &point, (end, letters, partner.factor), (tile, place));
-                        find();
-                    }
-                }
-                find();
-                if let Some(merging) = merging {
-                    tile.record.merges_at(&point.end);
-                    let found = self.merge(vertex, &point, (merging, &search), &mut tile.record);
-                    sum += tile.tally.finite(found);
-                }
+            let Some(point) = vertex.point.as_ref().filter(|_| vertex.joins && vertex.carried.edges < self.depths.max) else { continue };
+            joining.push(i);
+            // Photons lie anywhere in memory: they are asked for before they are needed, step by step.
+            if let Some(of) = joined.merging.filter(|_| vertex.carried.share > 0.0) {
+                of.store.grid().search(&mut searches[i as usize], point.end.p, self.radius);
+                merging.push(i);
             }
-            goes_on
-        });
-        if let Some(departure) = departure {
-            let found = self.escape(&departure, &mut tile.record);
-            sum += tile.tally.finite(found);
         }
-        tile.tally.add(&walked);
-        sum
+        // Light samples, and the photons' positions.
+        if self.techniques.connections {
+            for &i in joining.iter() {
+                let Walker { vertex: Some(vertex), stream, place, .. } = &mut walkers[i as usize] else { continue };
+                let Some(point) = &vertex.point else { continue };
+                self.next_event(vertex, point, stream, (tile, *place));
+            }
+        }
+        for &i in merging.iter() {
+            joined.merging.iter().for_each(|of| of.store.grid().approach(&mut searches[i as usize]));
+        }
+        // Connections, and the photons.
+        for &i in joining.iter() {
+            let Walker { vertex: Some(vertex), partner: Some(partner), place, .. } = &walkers[i as usize] else { continue };
+            let Some(point) = &vertex.point else { continue };
+            for (end, letters) in partner.vertices() {
+                self.connect(vertex, point, (end, letters, partner.factor), (tile, *place));
+            }
+            if tile.memory.shadows.is_full() {
+                tile.light_up(scene);
+            }
+        }
+        for &i in merging.iter() {
+            joined.merging.iter().for_each(|of| of.store.find(&mut searches[i as usize]));
+        }
+        // Merges.
+        for &i in merging.iter() {
+            let Walker { vertex: Some(vertex), sum, .. } = &mut walkers[i as usize] else { continue };
+            let (Some(point), Some(of)) = (&vertex.point, joined.merging) else { continue };
+            tile.record.merges_at(&point.end);
+            let found = self.merge(vertex, point, (of, &searches[i as usize]), &mut tile.record);
+            *sum += tile.tally.finite(found);
+        }
     }
 
     /// What the first vertex of a camera subpath carries.
@@ -210,7 +320,7 @@ impl<'a> Iteration<'a, '_> {
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
         stream: &mut S,
-        (tile, place): (&mut Tile<'_, R>, u32),
+        (tile, place): (&mut Tile<'_, '_, R>, u32),
     ) {
         let scene = self.subpaths.scene;
         let (u_emitter, u) = (stream.next_1d(), Vec2::from(stream.next_2d()));
@@ -241,7 +351,7 @@ impl<'a> Iteration<'a, '_> {
         vertex: &SubpathVertex<'a>,
         point: &SurfacePoint<'a>,
         (partner, letters, factor): (&LightVertex, Letters, f32),
-        (tile, place): (&mut Tile<'_, R>, u32),
+        (tile, place): (&mut Tile<'_, '_, R>, u32),
     ) {
         let edges = vertex.carried.edges + partner.carried.edges + 1;
         if !self.depths.contains(edges) {
