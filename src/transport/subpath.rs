@@ -133,24 +133,23 @@ impl<'a> Subpaths<'a, '_> {
         start: Start,
         stream: &mut S,
         tally: &mut Tally,
-        first: impl FnOnce(&Hit, f32) -> Carried<f32>,
+        first: impl Fn(&Hit, f32) -> Carried<f32>,
         mut visit: impl FnMut(&SubpathVertex<'a>, &mut S, &mut Tally) -> bool,
     ) -> Option<Departure> {
         let mut walk = Walk::new(start);
-        let mut first = Some(first);
         loop {
             tally.rays += 1;
             let Some(hit) = self.scene.intersect(&walk.ray) else { return Some(walk.departure()) };
-            let vertex = self.reach(&walk, hit, |hit, share| first.take().map(|first| first(hit, share)))?;
+            let vertex = self.reach(&walk, hit, &first);
             if !visit(&vertex, stream, tally) || !self.go_on(mode, &mut walk, &vertex, stream, tally) {
                 return None;
             }
         }
     }
 
-    /// The vertex where a walk has met a surface; `first` as with [`Subpaths::walk`], asked at the first vertex alone. `None` if it has no answer.
+    /// The vertex where a walk has met a surface; `first` as with [`Subpaths::walk`], asked at the first vertex alone.
     #[inline(always)]
-    pub fn reach(&self, walk: &Walk, hit: Hit, first: impl FnOnce(&Hit, f32) -> Option<Carried<f32>>) -> Option<SubpathVertex<'a>> {
+    pub fn reach(&self, walk: &Walk, hit: Hit, first: impl Fn(&Hit, f32) -> Carried<f32>) -> SubpathVertex<'a> {
         let Walk { ray, from, throughput, last, letters } = *walk;
         let point = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d);
         let max_roughness = point.as_ref().map_or(0.0, |point| point.bsdf.max_roughness());
@@ -161,9 +160,9 @@ impl<'a> Subpaths<'a, '_> {
                 let edge = Edge::between(cosines.0, cosines.1, end.p.distance_squared(hit.end.p));
                 self.weights.extend(carried, *scatter, edge, share)
             }
-            None => first(&hit, share)?,
+            None => first(&hit, share),
         };
-        Some(SubpathVertex { hit, point, joins: max_roughness > 0.0, from, d: ray.d, throughput, carried, letters })
+        SubpathVertex { hit, point, joins: max_roughness > 0.0, from, d: ray.d, throughput, carried, letters }
     }
 
     /// The next edge of a walk that is at `vertex`; false where it ends. Coordinates as with [`Subpaths::walk`].

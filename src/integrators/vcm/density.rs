@@ -29,6 +29,7 @@ struct Reading<'d, R> {
 }
 
 impl<R: Recorder> Recorder for Reading<'_, R> {
+    // What is taken down is told apart by pixel.
     const ON: bool = true;
     #[inline(always)]
     fn add(&mut self, edges: u32, technique: Technique, weighted: Rgb, unweighted: Rgb) {

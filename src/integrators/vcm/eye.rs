@@ -201,7 +201,7 @@ impl<'a> Iteration<'a, '_> {
                 return false;
             };
             let seen = &walker.seen;
-            walker.vertex = self.subpaths.reach(&walker.walk, scene.hit(ray, raw), |hit, share| Some(self.seen(seen, hit, share)));
+            walker.vertex = Some(self.subpaths.reach(&walker.walk, scene.hit(ray, raw), |hit, share| self.seen(seen, hit, share)));
             true
         });
     }
