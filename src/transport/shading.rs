@@ -66,6 +66,12 @@ impl<'a> SurfacePoint<'a> {
         })
     }
 
+    /// Roughness of the roughest lobe that light from where the walk came may meet; 0 where nothing but deltas, or nothing, scatters it.
+    #[inline(always)]
+    pub fn max_roughness(&self) -> f32 {
+        self.bsdf.max_roughness_from(self.given_local.z)
+    }
+
     /// `f(wi -> wo)` towards the world direction `w` and the density of `w`, over the lobes asked for and without any cosine; black
     /// where the sides of `w` disagree.
     #[inline(always)]

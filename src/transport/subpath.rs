@@ -113,7 +113,7 @@ impl<'a> Subpaths<'a, '_> {
     /// What a merge at the point counts for; 0 where none is evaluated.
     #[inline]
     pub fn share(&self, point: &SurfacePoint<'_>) -> f32 {
-        self.share_of(point, point.bsdf.max_roughness())
+        self.share_of(point, point.max_roughness())
     }
 
     #[inline(always)]
@@ -152,7 +152,7 @@ impl<'a> Subpaths<'a, '_> {
     pub fn reach(&self, walk: &Walk, hit: Hit, first: impl Fn(&Hit, f32) -> Carried<f32>) -> SubpathVertex<'a> {
         let Walk { ray, from, throughput, last, letters } = *walk;
         let point = SurfacePoint::new(&hit, self.scene.bsdf(hit.shape), ray.d);
-        let max_roughness = point.as_ref().map_or(0.0, |point| point.bsdf.max_roughness());
+        let max_roughness = point.as_ref().map_or(0.0, |point| point.max_roughness());
         let share = point.as_ref().map_or(0.0, |point| self.share_of(point, max_roughness));
         let carried = match &last {
             Some((end, carried, scatter)) => {

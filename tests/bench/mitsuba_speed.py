@@ -54,6 +54,34 @@ def worker(a):
         print(json.dumps({"cpu_seconds": cpu, "seconds": wall, "mean": mean}), flush=True)
 
 
+class Renderer:
+    """Mitsuba in a process of its own, warm: `render` gives what one more render of `samples` samples took."""
+
+    def __init__(self, variant, scene, options, python=sys.executable):
+        # scalar variants take their number of threads from the size of Mitsuba's pool: pin them to one processor
+        cpu = sorted(os.sched_getaffinity(0))[-1]
+        pin = (lambda: os.sched_setaffinity(0, {cpu})) if variant.startswith("scalar") else None
+        self.variant = variant
+        self.process = subprocess.Popen([python, os.path.abspath(__file__), scene, "--worker", variant, *options], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True, preexec_fn=pin)
+        first = self.process.stdout.readline()
+        if not first:
+            sys.exit(f"{variant} did not start")
+        self.size = json.loads(first)
+
+    def render(self):
+        self.process.stdin.write("\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            sys.exit(f"{self.variant} stopped")
+        return json.loads(line)
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait()
+
+
 def summary(rounds, samples):
     cpu = [r["cpu_seconds"] for r in rounds]
     return {"cpu_seconds": [round(c, 4) for c in cpu], "median_cpu_seconds": round(statistics.median(cpu), 4),
@@ -78,29 +106,15 @@ def main():
     names = [v for v in a.variants.split(",") if v]
     options = ["--spp", str(a.spp), "--max-depth", str(a.max_depth), "--rr-depth", str(a.rr_depth)]
     options += [x for k in ("width", "height") if getattr(a, k) for x in (f"--{k}", str(getattr(a, k)))]
-    # scalar variants take their number of threads from the size of Mitsuba's pool: pin them to one processor
-    cpu = sorted(os.sched_getaffinity(0))[-1]
-    procs, size = {}, None
-    for v in names:
-        pin = (lambda: os.sched_setaffinity(0, {cpu})) if v.startswith("scalar") else None
-        procs[v] = subprocess.Popen([sys.executable, os.path.abspath(__file__), a.scene, "--worker", v, *options], stdin=subprocess.PIPE,
-                                    stdout=subprocess.PIPE, text=True, preexec_fn=pin)
-        first = procs[v].stdout.readline()
-        if not first:
-            sys.exit(f"{v} did not start")
-        size = json.loads(first)
+    procs = {v: Renderer(v, a.scene, options) for v in names}
+    size = next(iter(procs.values())).size
     samples = size["width"] * size["height"] * a.spp
     times = {v: [] for v in names}
     other = []
     command = shlex.split(a.vs.replace("{spp}", str(a.spp)).replace("{width}", str(size["width"])).replace("{height}", str(size["height"]))) if a.vs else None
     for _ in range(a.rounds):
         for v in names:
-            procs[v].stdin.write("\n")
-            procs[v].stdin.flush()
-            line = procs[v].stdout.readline()
-            if not line:
-                sys.exit(f"{v} stopped")
-            times[v].append(json.loads(line))
+            times[v].append(procs[v].render())
         if command:
             done = subprocess.run(command, stdout=subprocess.PIPE, text=True)
             if done.returncode:
@@ -109,9 +123,8 @@ def main():
                 other.append({"cpu_seconds": float(json.loads(done.stdout)["cpu_seconds"])})
             except (ValueError, KeyError, TypeError) as e:
                 sys.exit(f"{command[0]} printed no JSON document with cpu_seconds: {e!r}")
-    for v in names:
-        procs[v].stdin.close()
-        procs[v].wait()
+    for renderer in procs.values():
+        renderer.close()
     out = {"scene": a.scene, **size, "spp": a.spp, "max_depth": a.max_depth, "rr_depth": a.rr_depth, "threads": 1, "rounds": a.rounds,
            "variants": {v: {**summary(times[v], samples), "image_mean": times[v][-1]["mean"]} for v in names}}
     if command:

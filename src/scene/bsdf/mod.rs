@@ -357,6 +357,28 @@ impl Bsdf {
         }
     }
 
+    /// Roughness of the roughest lobe there may be on the side that a direction of this local z comes from: 0 if all are deltas, or none is,
+    /// as behind most materials that are not [`twosided`].
+    #[inline(always)]
+    pub fn max_roughness_from(&self, z: f32) -> f32 {
+        match self {
+            Bsdf::Diffuse(b) if z > 0.0 => b.max_roughness(),
+            Bsdf::TwoSided(b) => b.max_roughness(),
+            _ if z > 0.0 || !self.black_behind() => self.max_roughness_any(),
+            _ => 0.0,
+        }
+    }
+
+    /// Does nothing scatter that comes from behind?
+    fn black_behind(&self) -> bool {
+        match self {
+            Bsdf::Diffuse(_) => true,
+            Bsdf::TwoSided(_) => false,
+            Bsdf::Blend(b) => b.first.black_behind() && b.second.black_behind(),
+            b => !b.transmissive(),
+        }
+    }
+
     /// Fetches the texels that questions about this point will soon ask for: they come from far away, and there is other work until then.
     #[inline(always)]
     pub fn prefetch(&self, uv: Vec2) {
