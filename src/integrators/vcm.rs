@@ -68,6 +68,8 @@ struct Engine<'a> {
     alone: Option<Technique>,
     /// Chains and their targets; `None` with the uniform sampler.
     aimed: Option<Aimed>,
+    /// Room for vertices that a batch of light subpaths wants: what the largest of the iteration before had.
+    room: usize,
 }
 
 impl<'a> Engine<'a> {
@@ -76,7 +78,20 @@ impl<'a> Engine<'a> {
         let camera_paths = camera_paths.map_or_else(|| photons.balanced_camera_paths(size), |paths| paths as usize);
         let ladder = if techniques.merges { photons.ladder_of_one_radius() } else { photons.ladder() };
         let aimed = ladder.map(|ladder| Aimed::new(&photons, &ladder, common.seed));
-        Self { scene, common: common.clone(), size, techniques, heuristic, photons, camera_paths, radius: 1.0, density: None, alone, aimed }
+        Self {
+            scene,
+            common: common.clone(),
+            size,
+            techniques,
+            heuristic,
+            photons,
+            camera_paths,
+            radius: 1.0,
+            density: None,
+            alone,
+            aimed,
+            room: 0,
+        }
     }
 
     /// Camera subpaths to their first vertex that merges, or would.
@@ -136,7 +151,7 @@ impl<'a> Engine<'a> {
         let count = if self.shines() { self.light_paths() } else { 0 };
         let mut sampler = Uniform { seed: self.common.seed };
         let keep = |batch: &mut Batch, path: &_, drawn: &[Drawn]| iteration.keep(batch, path, drawn);
-        let mut draw = sampler.draw(iteration, iteration.index, count, Batch::default, keep);
+        let mut draw = sampler.draw(iteration, iteration.index, count, || Batch::with_room(self.room), keep);
         iteration.finish(&mut draw.batches);
         stats.light_paths += draw.traced;
         draw.batches.iter().for_each(|batch| stats.count(&batch.tally));
@@ -207,7 +222,8 @@ impl Integrator for Engine<'_> {
         if let (Some(aimed), Some(sights)) = (chains, sights) {
             aimed.learn(sights, sums.as_deref());
         }
-        (self.density, self.aimed) = (density, aimed);
+        let room = light.largest_batch();
+        (self.density, self.aimed, self.room) = (density, aimed, room);
         stats
     }
 

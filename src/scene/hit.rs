@@ -7,13 +7,15 @@ use crate::math::eight::{Lanes, Vec3x8, copysign};
 use glam::{Vec2, Vec3};
 use wide::f32x8;
 
-/// A point that a ray may start from or end at, with what is known of its rounding error.
+/// A point that a ray may start from or end at, with what is known of its rounding error. In this order, so that what holds many can choose
+/// beside what the normal lies.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub struct Endpoint {
-    /// Position, world units.
-    pub p: Vec3,
     /// Unit geometric normal; zero for a point in free space.
     pub n_g: Vec3,
+    /// Position, world units.
+    pub p: Vec3,
     /// How far `p` may lie off its surface along `n_g`, world units: a bound on rounding error, not a tuning constant.
     pub offset: f32,
 }

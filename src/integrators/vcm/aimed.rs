@@ -50,7 +50,7 @@ impl Engine<'_> {
     ) -> (LightSide, Option<Vec<Collected>>) {
         let count = self.light_paths();
         let points = &sights.points;
-        let start = || (sights.has_regions().then(|| Deposits::new(points.all().len(), true)), Batch::default());
+        let start = || (sights.has_regions().then(|| Deposits::new(points.all().len(), true)), Batch::with_room(self.room));
         let draw = aimed.draw(
             *iteration,
             sights,

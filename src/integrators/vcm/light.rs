@@ -27,21 +27,25 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// A vertex of a light subpath whose surface has a lobe that is no delta: 116 bytes.
+/// A vertex of a light subpath whose surface has a lobe that is no delta: two lines of the processor's cache. Merges ask for the first alone, which
+/// ends with the normal.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub(super) struct LightVertex {
+    /// Unit direction towards where the light came from.
+    pub(super) wi: Vec3,
+    /// Flux that arrives, of the path alone: its mean over paths is the power that arrives here.
+    pub(super) flux: Rgb,
+    pub(super) carried: Carried<f32>,
     pub(super) end: Endpoint,
     /// Shading normal and first tangent; the second is their product.
     n_s: Vec3,
     s: Vec3,
     uv: Vec2,
     shape: ShapeId,
-    /// Unit direction towards where the light came from.
-    pub(super) wi: Vec3,
-    /// Flux that arrives, of the path alone: its mean over paths is the power that arrives here.
-    pub(super) flux: Rgb,
-    pub(super) carried: Carried<f32>,
 }
+
+const _: () = assert!(std::mem::offset_of!(LightVertex, end) + size_of::<Vec3>() == 64 && size_of::<LightVertex>() == 128);
 
 impl LightVertex {
     pub(super) fn new(vertex: &SubpathVertex<'_>, point: &SurfacePoint<'_>) -> Self {
@@ -167,6 +171,11 @@ struct Waiting {
 }
 
 impl Batch {
+    /// With room for so many vertices: what grows is copied, again and again.
+    pub(super) fn with_room(vertices: usize) -> Self {
+        Self { vertices: Vec::with_capacity(vertices), ..Self::default() }
+    }
+
     /// Keeps the splats that the camera sees, by length as well if images of techniques are `recorded`.
     fn trace_splats(&mut self, scene: &Scene, recorded: bool) {
         let Self { splats, splat_ends, waiting, tally, recorded: by_length, .. } = self;
@@ -230,6 +239,11 @@ impl LightSide {
             paths += batch.ends.len();
         }
         Self { batches, firsts, paths, pairing }
+    }
+
+    /// Vertices of the batch that has most.
+    pub(super) fn largest_batch(&self) -> usize {
+        self.batches.iter().map(|batch| batch.vertices.len()).max().unwrap_or(0)
     }
 
     /// The light subpath that camera subpath number `pixel` is connected to; `None` where there is none.
@@ -321,11 +335,7 @@ impl Merging {
         };
         // Close together, since they are read again in the order of cells.
         let positions: Vec<Vec3> = (0..places.len()).into_par_iter().with_min_len(1 << 12).map(|i| vertex(i).end.p).collect();
-        let ahead = |i: usize| {
-            let vertex = vertex(i);
-            fetch(vertex);
-            fetch(&vertex.carried);
-        };
+        let ahead = |i: usize| fetch(vertex(i));
         let item = |i: usize| MergeVertex::new(vertex(i), i as u32);
         let store = Store::build_ahead(places.len(), |i| positions[i], ahead, item, cell);
         Self { store, letters }
