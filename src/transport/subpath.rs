@@ -20,7 +20,7 @@ pub struct SubpathVertex<'a> {
     pub hit: Hit,
     /// Ready to scatter; `None` where the sides of the arriving direction disagree, so that nothing but emission counts.
     pub point: Option<SurfacePoint<'a>>,
-    /// Has the surface there a lobe that is no delta, by which subpaths can be joined?
+    /// Has the surface, on the side arrived at, a lobe that is no delta, by which subpaths can be joined?
     pub joins: bool,
     /// The vertex before: on the light, in the camera or on a surface.
     pub from: Endpoint,

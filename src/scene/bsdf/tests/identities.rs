@@ -3,7 +3,8 @@
 use super::support::*;
 use crate::math::{Rgb, warp};
 use crate::samplers::Stream;
-use crate::scene::bsdf::{Bsdf, Lobes, Mode};
+use crate::scene::bsdf::{Bsdf, Lobes, Mode, blend, twosided};
+use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
 
 const UV: Vec2 = Vec2::new(0.2, 0.3);
@@ -133,6 +134,38 @@ fn refraction_has_the_index_of_its_directions() {
         }
     }
     assert!(found > 100, "{found}");
+}
+
+/// A side without roughness has no value, no density and no rough sample; another may have all of them, and most have.
+#[test]
+fn what_scatters_on_a_side_is_known_ahead() {
+    let one_side = |b: &Bsdf| Bsdf::TwoSided(twosided::TwoSided { front: Box::new(b.clone()), back: None });
+    let rough = phong(0.3, 0.4, 10.0);
+    let half_wrapped = blend::Blend { weight: Texture::grey(0.5), first: Box::new(rough.clone()), second: Box::new(one_side(&rough)) };
+    let wrapped = [("rough on both sides".to_owned(), one_side(&rough)), ("blend of such".to_owned(), Bsdf::Blend(half_wrapped))];
+    let (mut black, mut behind) = (0, 0);
+    for (name, b) in materials().iter().chain(&wrapped) {
+        let mut s = stream(8);
+        for side in [1.0, -1.0] {
+            let roughness = b.max_roughness_from(0.5 * side);
+            assert!(roughness == 0.0 || roughness == b.max_roughness(), "{name}");
+            let mut found = false;
+            for _ in 0..300 {
+                let given = warp::sphere(pair(&mut s));
+                let given = given.with_z(given.z.abs() * side);
+                let other = warp::sphere(pair(&mut s));
+                let (f, pdf) = b.eval_pdf(UV, given, other, Mode::Importance, Lobes::All);
+                let sample = b.sample(UV, given, Mode::Importance, Lobes::All, s.next_1d(), pair(&mut s));
+                found |= !f.is_black() || pdf > 0.0 || sample.is_some_and(|s| !s.delta);
+            }
+            assert!(roughness > 0.0 || !found, "{name}: something on the side {side}");
+            // Of those that may scatter all do, but where a hole is all there is.
+            assert!(roughness == 0.0 || found || name == "all hole", "{name}: nothing on the side {side}");
+            black += usize::from(roughness == 0.0 && b.max_roughness() > 0.0);
+            behind += usize::from(roughness > 0.0 && side < 0.0);
+        }
+    }
+    assert!(black > 10 && behind > 4, "{black} and {behind}");
 }
 
 #[test]

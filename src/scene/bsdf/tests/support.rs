@@ -121,7 +121,7 @@ fn build(node: Node) -> Bsdf {
     }
 }
 
-fn phong(diffuse: f32, specular: f32, exponent: f32) -> Bsdf {
+pub(super) fn phong(diffuse: f32, specular: f32, exponent: f32) -> Bsdf {
     let (diffuse_reflectance, specular_reflectance) = (Texture::grey(diffuse), Texture::Constant(Rgb::new(specular, 0.8 * specular, 0.1)));
     Bsdf::Phong(phong::Phong { diffuse_reflectance, specular_reflectance, exponent })
 }
