@@ -48,6 +48,8 @@ pub struct SurfacePoint<'a> {
     pub given: Vec3,
     /// The same in the shading frame.
     pub given_local: Vec3,
+    /// What [`Bsdf::as_lambertian`] says: many directions are asked about at one point, and of this material little is to be asked.
+    pub(super) lambertian: Option<(Rgb, f32)>,
 }
 
 impl<'a> SurfacePoint<'a> {
@@ -56,14 +58,14 @@ impl<'a> SurfacePoint<'a> {
     pub fn new(hit: &Hit, bsdf: &'a Bsdf, d: Vec3) -> Option<Self> {
         let given = -d;
         bsdf.prefetch(hit.uv);
-        sides_agree(given, hit.end.n_g, hit.frame.n).then(|| Self {
-            bsdf,
-            end: hit.end,
-            frame: hit.frame,
-            uv: hit.uv,
-            given,
-            given_local: hit.frame.to_local(given),
-        })
+        sides_agree(given, hit.end.n_g, hit.frame.n).then(|| Self::seen_from(given, bsdf, hit.end, hit.frame, hit.uv))
+    }
+
+    /// A point of that material, frame and texture coordinates, for a walk that came from the unit direction `given`, whose sides agree.
+    #[inline(always)]
+    pub fn seen_from(given: Vec3, bsdf: &'a Bsdf, end: Endpoint, frame: Frame, uv: Vec2) -> Self {
+        let given_local = frame.to_local(given);
+        Self { bsdf, end, frame, uv, given, given_local, lambertian: bsdf.as_lambertian(given_local.z) }
     }
 
     /// Roughness of the roughest lobe that light from where the walk came may meet; 0 where nothing but deltas, or nothing, scatters it.

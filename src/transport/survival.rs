@@ -13,7 +13,7 @@
 
 use super::mis::Scatter;
 use super::shading::{SurfacePoint, sides_agree};
-use crate::math::Rgb;
+use crate::math::{Rgb, warp};
 use crate::scene::bsdf::{Lobes, Mode};
 use glam::{Vec2, Vec3};
 
@@ -44,8 +44,30 @@ pub struct Onward {
 
 impl SurfacePoint<'_> {
     /// What the point says about going along the unit direction `w`; `None` where it does not scatter there.
-    #[inline]
+    #[inline(always)]
     pub fn meet(&self, mode: Mode, w: Vec3) -> Option<Met> {
+        match self.lambertian {
+            Some((f, side)) => self.meet_lambertian(f, side, mode, w),
+            None => self.meet_any(mode, w),
+        }
+    }
+
+    /// [`SurfacePoint::meet`] where all directions on one side have the value `f`.
+    #[inline(always)]
+    fn meet_lambertian(&self, f: Rgb, side: f32, mode: Mode, w: Vec3) -> Option<Met> {
+        let (given, sampled) = (self.given_local.z, w.dot(self.frame.n));
+        // `sides_agree`, with one product already there.
+        if !(w.dot(self.end.n_g) * sampled > 0.0 && sampled * side > 0.0) {
+            return None;
+        }
+        let pdfs = [sampled, given].map(|z| warp::cosine_hemisphere_pdf(z * side).0);
+        let (fwd, rev) = with_survival(mode, f.max_component(), pdfs, 1.0, [sampled, given]);
+        Some(Met { f, fwd, rev })
+    }
+
+    /// [`SurfacePoint::meet`] of any material.
+    #[inline(never)]
+    fn meet_any(&self, mode: Mode, w: Vec3) -> Option<Met> {
         if !sides_agree(w, self.end.n_g, self.frame.n) {
             return None;
         }

@@ -58,8 +58,7 @@ impl LightVertex {
     #[inline]
     pub(super) fn point<'a>(&self, scene: &'a crate::scene::Scene) -> SurfacePoint<'a> {
         let frame = Frame { s: self.s, t: self.n_s.cross(self.s), n: self.n_s };
-        let (bsdf, given) = (scene.bsdf(self.shape), self.wi);
-        SurfacePoint { bsdf, end: self.end, frame, uv: self.uv, given, given_local: frame.to_local(given) }
+        SurfacePoint::seen_from(self.wi, scene.bsdf(self.shape), self.end, frame, self.uv)
     }
 }
 

@@ -249,7 +249,7 @@ fn arrive(
     if [joint.here.fwd, joint.here.rev].into_iter().any(|pdf| pdf < 1e-12) {
         return None;
     }
-    let end = SurfacePoint { given: -joint.w, given_local: other.frame.to_local(-joint.w), ..*other };
+    let end = SurfacePoint::seen_from(-joint.w, other.bsdf, other.end, other.frame, other.uv);
     let carried = it.subpaths.weights.extend(&vertex.carried, scatter, edge, it.subpaths.share(&end));
     Some((carried, end.meet(Mode::Radiance, other.given)?))
 }

@@ -11,6 +11,7 @@
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
 use twosided::turned;
 
 /// What is carried along a walk.
@@ -259,6 +260,16 @@ impl Bsdf {
     pub fn as_diffuse(&self, z: f32) -> Option<(&Texture, f32)> {
         match self.facing(Vec3::new(0.0, 0.0, z)) {
             (Bsdf::Diffuse(b), side) => Some((&b.reflectance, side)),
+            _ => None,
+        }
+    }
+
+    /// The value for all directions on the side of a direction of this local z, and that side (1 or -1), where the material there is [`diffuse`] and
+    /// nothing else, and the same everywhere; `None` too where it is black.
+    #[inline(always)]
+    pub fn as_lambertian(&self, z: f32) -> Option<(Rgb, f32)> {
+        match self.as_diffuse(z)? {
+            (Texture::Constant(reflectance), side) if z * side > 0.0 && !reflectance.is_black() => Some((*reflectance * FRAC_1_PI, side)),
             _ => None,
         }
     }
