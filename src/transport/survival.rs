@@ -16,6 +16,7 @@ use super::shading::{SurfacePoint, sides_agree};
 use crate::math::{Rgb, warp};
 use crate::scene::bsdf::{Lobes, Mode};
 use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
 
 /// Largest survival, so that light caught in lossless glass or between mirrors ends too: after fifty events on average.
 pub const CEILING: f32 = 0.98;
@@ -47,19 +48,20 @@ impl SurfacePoint<'_> {
     #[inline(always)]
     pub fn meet(&self, mode: Mode, w: Vec3) -> Option<Met> {
         match self.lambertian {
-            Some((f, side)) => self.meet_lambertian(f, side, mode, w),
+            Some((reflectance, side)) => self.meet_lambertian(reflectance, side, mode, w),
             None => self.meet_any(mode, w),
         }
     }
 
-    /// [`SurfacePoint::meet`] where all directions on one side have the value `f`.
+    /// [`SurfacePoint::meet`] where light is reflected alike in all directions.
     #[inline(always)]
-    fn meet_lambertian(&self, f: Rgb, side: f32, mode: Mode, w: Vec3) -> Option<Met> {
+    fn meet_lambertian(&self, reflectance: Rgb, side: f32, mode: Mode, w: Vec3) -> Option<Met> {
         let (given, sampled) = (self.given_local.z, w.dot(self.frame.n));
         // `sides_agree`, with one product already there.
         if !(w.dot(self.end.n_g) * sampled > 0.0 && sampled * side > 0.0) {
             return None;
         }
+        let f = reflectance * FRAC_1_PI;
         let pdfs = [sampled, given].map(|z| warp::cosine_hemisphere_pdf(z * side).0);
         let (fwd, rev) = with_survival(mode, f.max_component(), pdfs, 1.0, [sampled, given]);
         Some(Met { f, fwd, rev })
@@ -81,8 +83,36 @@ impl SurfacePoint<'_> {
     }
 
     /// The next direction of a walk; `None` where it ends: absorbed, sides that disagree, or the roulette lost. Coordinates are in [0, 1).
-    #[inline]
+    #[inline(never)]
     pub fn scatter(&self, mode: Mode, u_lobe: f32, u: Vec2, u_survive: f32) -> Option<Onward> {
+        match self.lambertian {
+            Some((reflectance, side)) => self.scatter_lambertian(reflectance, side, mode, u, u_survive),
+            None => self.scatter_any(mode, u_lobe, u, u_survive),
+        }
+    }
+
+    /// [`SurfacePoint::scatter`] where light is reflected alike in all directions: the roulette is known before the direction.
+    #[inline(always)]
+    fn scatter_lambertian(&self, reflectance: Rgb, side: f32, mode: Mode, u: Vec2, u_survive: f32) -> Option<Onward> {
+        let largest = reflectance.max_component();
+        let survival = largest.min(CEILING);
+        if u_survive >= survival {
+            return None;
+        }
+        let w = warp::cosine_hemisphere(u);
+        let d = self.frame.to_world(Vec3::new(w.x, w.y, w.z * side));
+        if !sides_agree(d, self.end.n_g, self.frame.n) {
+            return None;
+        }
+        let given = self.given_local.z * side;
+        let pdfs = [w.z, given].map(|z| warp::cosine_hemisphere_pdf(z).0);
+        let (fwd, rev) = with_survival(mode, largest * pdfs[0] / w.z, pdfs, 1.0, [w.z, given]);
+        Some(Onward { d, weight: reflectance * (self.weight_adjoint(mode, d) / survival), scatter: Scatter::rough(fwd, rev) })
+    }
+
+    /// [`SurfacePoint::scatter`] of any material.
+    #[inline(always)]
+    fn scatter_any(&self, mode: Mode, u_lobe: f32, u: Vec2, u_survive: f32) -> Option<Onward> {
         let (s, d) = self.draw(mode, Lobes::All, u_lobe, u)?;
         let index2 = if s.delta { s.eta * s.eta } else { self.square_index(self.given_local, s.w) };
         let largest = s.weight.max_component();
@@ -106,11 +136,16 @@ impl SurfacePoint<'_> {
             let (fwd, rev) = with_survival(mode, value, [s.pdf_fwd, s.pdf_rev], index2, [s.w.z, self.given_local.z]);
             Scatter::rough(fwd, rev)
         };
-        let adjoint = match mode {
+        Some(Onward { d, weight: s.weight * (self.weight_adjoint(mode, d) / survival), scatter })
+    }
+
+    /// The adjoint factor, which walks from the light have.
+    #[inline(always)]
+    fn weight_adjoint(&self, mode: Mode, d: Vec3) -> f32 {
+        match mode {
             Mode::Radiance => 1.0,
             Mode::Importance => self.adjoint(d),
-        };
-        Some(Onward { d, weight: s.weight * (adjoint / survival), scatter })
+        }
     }
 
     /// The squared index of refraction on `sampled`'s side over that on `given`'s.

@@ -11,7 +11,6 @@
 use crate::math::Rgb;
 use crate::scene::texture::Texture;
 use glam::{Vec2, Vec3};
-use std::f32::consts::FRAC_1_PI;
 use twosided::turned;
 
 /// What is carried along a walk.
@@ -264,12 +263,12 @@ impl Bsdf {
         }
     }
 
-    /// The value for all directions on the side of a direction of this local z, and that side (1 or -1), where the material there is [`diffuse`] and
-    /// nothing else, and the same everywhere; `None` too where it is black.
+    /// The reflectance on the side of a direction of this local z, and that side (1 or -1), where the material there is [`diffuse`] and nothing else,
+    /// and the same everywhere; `None` too where it is black.
     #[inline(always)]
     pub fn as_lambertian(&self, z: f32) -> Option<(Rgb, f32)> {
         match self.as_diffuse(z)? {
-            (Texture::Constant(reflectance), side) if z * side > 0.0 && !reflectance.is_black() => Some((*reflectance * FRAC_1_PI, side)),
+            (Texture::Constant(reflectance), side) if z * side > 0.0 && !reflectance.is_black() => Some((*reflectance, side)),
             _ => None,
         }
     }
