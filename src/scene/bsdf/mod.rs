@@ -379,11 +379,12 @@ impl Bsdf {
         }
     }
 
-    /// Does nothing scatter that comes from behind?
+    /// Do deltas at most scatter what comes from behind?
     fn black_behind(&self) -> bool {
         match self {
             Bsdf::Diffuse(_) => true,
             Bsdf::TwoSided(_) => false,
+            Bsdf::Mask(b) => b.nested.black_behind(),
             Bsdf::Blend(b) => b.first.black_behind() && b.second.black_behind(),
             b => !b.transmissive(),
         }
