@@ -171,3 +171,50 @@ pub(super) fn with_survival(mode: Mode, value: f32, pdfs: [f32; 2], index2: f32,
     };
     ((CEILING * pdfs[0]).min(kept_fwd), (CEILING * pdfs[1]).min(kept_rev))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Frame;
+    use crate::samplers::{Key, Purpose, Stream};
+    use crate::scene::bsdf::{Bsdf, diffuse::Diffuse, twosided::TwoSided};
+    use crate::scene::hit::Endpoint;
+    use crate::scene::texture::{Checkerboard, Texture};
+    use glam::Affine2;
+
+    /// A constant reflectance answers like a texture of one colour, which is asked like any material: to the last bit, in both walks, on both
+    /// sides, where normals are bent.
+    #[test]
+    fn a_constant_reflectance_answers_like_any_material() {
+        let constant = || Texture::Constant(Rgb::new(0.2, 0.7, 0.4));
+        let board = || Texture::Checkerboard(Box::new(Checkerboard { color0: constant(), color1: constant(), to_uv: Affine2::IDENTITY }));
+        let diffuse = |reflectance| Bsdf::Diffuse(Diffuse { reflectance });
+        let twosided = |reflectance| Bsdf::TwoSided(TwoSided { front: Box::new(diffuse(reflectance)), back: None });
+        let mut s = Key { seed: 1, iteration: 0, index: 0, purpose: Purpose::Test }.stream();
+        let (mut met, mut scattered, mut ended) = (0, 0, 0);
+        for (constant, textured) in [(diffuse(constant()), diffuse(board())), (twosided(constant()), twosided(board()))] {
+            for _ in 0..2000 {
+                let [n_g, bend, given, w] = std::array::from_fn(|_| warp::sphere(Vec2::from(s.next_2d())));
+                let n_s = (n_g + 0.5 * bend).normalize();
+                if !sides_agree(given, n_g, n_s) {
+                    continue;
+                }
+                let (end, frame) = (Endpoint { n_g, ..Endpoint::free(Vec3::ONE) }, Frame::from_normal(n_s));
+                let [quick, slow] = [&constant, &textured].map(|b| SurfacePoint::seen_from(given, b, end, frame, Vec2::ZERO));
+                let reflects = matches!(constant, Bsdf::TwoSided(_)) || given.dot(n_s) > 0.0;
+                assert_eq!((quick.lambertian.is_some(), slow.lambertian.is_some()), (reflects, false));
+                let (u_lobe, u, u_survive) = (s.next_1d(), Vec2::from(s.next_2d()), s.next_1d());
+                for mode in [Mode::Radiance, Mode::Importance] {
+                    let (a, b) = (quick.meet(mode, w), slow.meet(mode, w));
+                    assert_eq!(format!("{a:?}"), format!("{b:?}"));
+                    let (c, d) = (quick.scatter(mode, u_lobe, u, u_survive), slow.scatter(mode, u_lobe, u, u_survive));
+                    assert_eq!(format!("{c:?}"), format!("{d:?}"));
+                    met += usize::from(a.is_some());
+                    scattered += usize::from(c.is_some());
+                    ended += usize::from(c.is_none());
+                }
+            }
+        }
+        assert!(met > 1000 && scattered > 1000 && ended > 1000, "{met}, {scattered}, {ended}");
+    }
+}
