@@ -53,6 +53,12 @@ fn mean_of_squares(c: f32, g: f32, eta: f32) -> f32 {
 /// Fresnel's equations for a metal of complex relative index `eta + i k`, at cosine `cos` in [0, 1], exactly (\[MOELLER07\]).
 #[inline]
 pub fn conductor(cos: f32, eta: Rgb, k: Rgb) -> Rgb {
+    // What the equations say of it as well: a perfect mirror is worth no roots.
+    if eta.is_black() { Rgb::WHITE } else { real_conductor(cos, eta, k) }
+}
+
+#[inline]
+fn real_conductor(cos: f32, eta: Rgb, k: Rgb) -> Rgb {
     let (eta, k) = (Vec3A::from_array(eta.to_array()), Vec3A::from_array(k.to_array()));
     let cos2 = cos * cos;
     let sin2 = (1.0 - cos2).max(0.0);
@@ -128,8 +134,8 @@ mod tests {
         assert!(dielectric(-0.75, 1.5).reflectance < 1.0);
         // Eta 0, k 1: a perfect mirror at every angle, the material "none".
         for i in 0..=10 {
-            let f = conductor(i as f32 / 10.0, Rgb::BLACK, Rgb::WHITE);
-            assert_eq!(f, Rgb::WHITE);
+            let mirrors = [conductor, real_conductor].map(|fresnel| fresnel(i as f32 / 10.0, Rgb::BLACK, Rgb::WHITE));
+            assert_eq!(mirrors, [Rgb::WHITE; 2]);
         }
         // A metal without absorption is a dielectric.
         for i in 1..=10 {
