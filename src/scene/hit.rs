@@ -7,8 +7,8 @@ use crate::math::eight::{Lanes, Vec3x8, copysign};
 use glam::{Vec2, Vec3};
 use wide::f32x8;
 
-/// A point that a ray may start from or end at, with what is known of its rounding error. In this order, so that what holds many can choose
-/// beside what the normal lies.
+/// A point that a ray may start from or end at, with what is known of its rounding error. Laid out with the normal first, so that an
+/// owner of many can place it in the cache line of what is read with it.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Endpoint {

@@ -55,14 +55,14 @@ def worker(a):
 
 
 class Renderer:
-    """Mitsuba in a process of its own, warm: `render` gives what one more render of `samples` samples took."""
+    """Mitsuba in a process of its own, warm: `render` renders once more and gives what `worker` says of it; `size` is the film's."""
 
-    def __init__(self, variant, scene, options, python=sys.executable):
+    def __init__(self, variant, scene, options):
         # scalar variants take their number of threads from the size of Mitsuba's pool: pin them to one processor
         cpu = sorted(os.sched_getaffinity(0))[-1]
         pin = (lambda: os.sched_setaffinity(0, {cpu})) if variant.startswith("scalar") else None
         self.variant = variant
-        self.process = subprocess.Popen([python, os.path.abspath(__file__), scene, "--worker", variant, *options], stdin=subprocess.PIPE,
+        self.process = subprocess.Popen([sys.executable, os.path.abspath(__file__), scene, "--worker", variant, *options], stdin=subprocess.PIPE,
                                         stdout=subprocess.PIPE, text=True, preexec_fn=pin)
         first = self.process.stdout.readline()
         if not first:
