@@ -6,18 +6,25 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Starts a render without end, sends it signals once it has iterated, and gives its exit status.
+/// Starts a render without end, sends it signals once it has iterated, and gives its exit status. The second signal waits until the first is
+/// told of: of signals sent together, none is promised to arrive first.
 fn interrupt(bench: &Bench, method: &str, signals: &[&str]) -> Option<i32> {
-    let arguments = ["render", method, "lamp/scene.xml", "-o", "a.exr", "--time", "600", "--checkpoint", "0.001", "-q"];
-    let mut child = bench.command(&arguments).stdout(Stdio::null()).spawn().unwrap();
+    let arguments = ["render", method, "lamp/scene.xml", "-o", "a.exr", "--time", "600", "--checkpoint", "0.001"];
+    let mut child = bench.command(&arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut told = BufReader::new(child.stderr.take().unwrap()).lines();
     let start = Instant::now();
     // The first checkpoint shows that it renders.
     while !bench.path("a.exr").exists() && start.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(5));
     }
-    for signal in signals {
+    for (index, signal) in signals.iter().enumerate() {
         assert!(Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status().unwrap().success());
+        assert!(
+            index > 0 || told.any(|line| line.unwrap().contains(&format!("SIG{signal}: ending"))),
+            "{method} does not tell of {signal}"
+        );
     }
+    told.for_each(drop);
     let status = child.wait().unwrap();
     assert!(start.elapsed() < Duration::from_secs(60), "{method} ends only with its time");
     status.code()
