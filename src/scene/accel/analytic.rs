@@ -2,6 +2,7 @@
 
 use super::triangle::Best;
 use glam::{DAffine3, DVec3, Vec3};
+use wide::{f32x8, f64x4};
 
 /// One shape and its number.
 #[derive(Clone)]
@@ -92,5 +93,60 @@ impl Analytic {
             hit
         });
         hit
+    }
+}
+
+/// Where eight lines cross a sphere, the nearer crossing first; NaN where one passes it by. `None` if all do. Operation for operation what a
+/// ray alone is told.
+#[inline(always)]
+pub(super) fn eight_through_sphere(minus_o: [f32x8; 3], d: [f32x8; 3], center: DVec3, radius2: f64) -> Option<[f32x8; 2]> {
+    let (low, high) = (FourLines::new::<0>(minus_o, d, center, radius2), FourLines::new::<4>(minus_o, d, center, radius2));
+    if !(low.discriminant.simd_ge(f64x4::ZERO) | high.discriminant.simd_ge(f64x4::ZERO)).any() {
+        return None;
+    }
+    let ([a, b], [c, d]) = (low.roots(), high.roots());
+    let single = |low: f64x4, high: f64x4| {
+        let ([a, b, c, d], [e, f, g, h]) = (low.to_array(), high.to_array());
+        f32x8::new([a, b, c, d, e, f, g, h].map(|t| t as f32))
+    };
+    Some([single(a, c), single(b, d)])
+}
+
+/// Four lines and the equation `a t^2 + 2 h t + c = 0` of each.
+struct FourLines {
+    a: f64x4,
+    h: f64x4,
+    c: f64x4,
+    /// `h^2 - a c`, by the distance of the line from the centre.
+    discriminant: f64x4,
+}
+
+impl FourLines {
+    /// The lanes from `FIRST` on.
+    #[inline(always)]
+    fn new<const FIRST: usize>(minus_o: [f32x8; 3], d: [f32x8; 3], center: DVec3, radius2: f64) -> Self {
+        let four = |v: f32x8| {
+            let v = v.to_array();
+            f64x4::new([f64::from(v[FIRST]), f64::from(v[FIRST + 1]), f64::from(v[FIRST + 2]), f64::from(v[FIRST + 3])])
+        };
+        let from = |minus_o: f32x8, center: f64| -four(minus_o) - f64x4::splat(center);
+        let o = [from(minus_o[0], center.x), from(minus_o[1], center.y), from(minus_o[2], center.z)];
+        let d = [four(d[0]), four(d[1]), four(d[2])];
+        let dot = |p: [f64x4; 3], q: [f64x4; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+        let radius2 = f64x4::splat(radius2);
+        let (a, h, c) = (dot(d, d), dot(o, d), dot(o, o) - radius2);
+        let along = h / a;
+        let off = [o[0] - d[0] * along, o[1] - d[1] * along, o[2] - d[2] * along];
+        Self { a, h, c, discriminant: a * (radius2 - dot(off, off)) }
+    }
+
+    /// Both roots, the smaller first, as [`roots`] has them; the root of a negative discriminant makes them NaN.
+    #[inline(always)]
+    fn roots(&self) -> [f64x4; 2] {
+        let sign = f64x4::splat(-0.0);
+        let root = self.discriminant.sqrt();
+        let q = -(self.h + (root.abs() | (self.h & sign)));
+        let (r, s) = (q / self.a, q.simd_eq(f64x4::ZERO).select(f64x4::ZERO, self.c / q));
+        [r.fast_min(s), r.fast_max(s)]
     }
 }

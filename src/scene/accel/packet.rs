@@ -5,12 +5,12 @@
 //! computes for a ray alone, so the answers are the same bits. Woop's test orders the axes by the ray's largest one; the rays of a packet
 //! share that axis, so that no lane needs an order of its own. `batch.rs` sees to it, and decides whether a packet is worth it.
 
-use super::analytic::Analytic;
+use super::analytic::{Analytic, Shape, eight_through_sphere};
 use super::node::{ANALYTIC, EMPTY, LEAF, Node};
 use super::probe::{FLATTEST, NEXT, PAD};
 use super::triangle::{Best, DOUBTFUL, Tri8};
 use super::{Bvh, DEEP, RawHit, Ray};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::cell::Cell;
 use wide::{f32x8, u32x8};
 
@@ -159,6 +159,14 @@ impl<const K: usize> Packet<K> {
         Some((inside & t.simd_gt(zero) & t.simd_le(t_max), [t, u, v]))
     }
 
+    /// Which of the active rays hit a sphere with `0 < t <= t_max`, and the first such `t`.
+    #[inline(always)]
+    fn hits_sphere(&self, center: DVec3, radius2: f64, active: f32x8, t_max: f32x8) -> Option<(f32x8, f32x8)> {
+        let both = eight_through_sphere(self.minus_o, self.d, center, radius2)?;
+        let [near, far] = both.map(|t| t.simd_gt(f32x8::ZERO) & t.simd_le(t_max) & active);
+        Some((near | far, near.select(both[0], both[1])))
+    }
+
     #[cold]
     #[inline(never)]
     fn exactly(&self, leaf: Tri8<'_>, n: usize, mask: u32, mut t: f32x8) -> f32x8 {
@@ -282,6 +290,17 @@ impl<const K: usize> Found<K> for Bests {
 
     #[inline(never)]
     fn analytic(mut self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self {
+        if let Shape::Sphere { center, radius2 } = shape.shape {
+            if let Some((hit, t)) = p.hits_sphere(center, radius2, active, self.t) {
+                let prim = u32x8::splat(shape.prim);
+                let better = hit & (t.simd_lt(self.t) | f32x8::from_bits(prim.simd_lt(self.prim)));
+                self.t = better.select(t, self.t);
+                self.u = better.select(f32x8::ZERO, self.u);
+                self.v = better.select(f32x8::ZERO, self.v);
+                self.prim = better.to_bits().select(prim, self.prim);
+            }
+            return self;
+        }
         for lane in lanes(active.to_bitmask()) {
             let (t, u, v) = (&mut self.t.as_mut_array()[lane], &mut self.u.as_mut_array()[lane], &mut self.v.as_mut_array()[lane]);
             let prim = &mut self.prim.as_mut_array()[lane];
@@ -318,6 +337,13 @@ impl<const K: usize> Found<K> for Stopped {
 
     #[inline(never)]
     fn analytic(mut self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self {
+        if let Shape::Sphere { center, radius2 } = shape.shape {
+            if let Some((hit, _)) = p.hits_sphere(center, radius2, active, self.t_max) {
+                self.blocked |= hit;
+                self.t_max |= hit;
+            }
+            return self;
+        }
         for lane in lanes(active.to_bitmask()) {
             let t_max = &mut self.t_max.as_mut_array()[lane];
             if shape.occluded(p.origin(lane), p.direction(lane), *t_max) {
