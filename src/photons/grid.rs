@@ -35,18 +35,21 @@ impl Order {
 
     /// What belongs to the items, place by place; `item` is asked once for the number of each.
     pub fn gather<T: Send>(&self, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        self.gather_ahead(|_| (), item)
+        let mut gathered = Vec::new();
+        self.gather_into(&mut gathered, |_| (), item);
+        gathered
     }
 
-    /// [`Order::gather`]; `ahead` is told of each number before its turn, to ask for the memory: items lie anywhere.
-    pub fn gather_ahead<T: Send>(&self, ahead: impl Fn(usize) + Sync, item: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    /// [`Order::gather`] in place of what `gathered` held; `ahead` is told of each number before its turn, to ask for the memory: items lie
+    /// anywhere.
+    pub fn gather_into<T: Send>(&self, gathered: &mut Vec<T>, ahead: impl Fn(usize) + Sync, item: impl Fn(usize) -> T + Sync) {
         let one = |(place, &i): (usize, &u32)| {
             if let Some(&later) = self.0.get(place + AHEAD) {
                 ahead(later as usize);
             }
             item(i as usize)
         };
-        self.0.par_iter().with_min_len(1 << 12).enumerate().map(one).collect()
+        self.0.par_iter().with_min_len(1 << 12).enumerate().map(one).collect_into_vec(gathered);
     }
 }
 

@@ -29,11 +29,13 @@ pub struct Store<T> {
 impl<T: Send> Store<T> {
     /// Sorts `count` items, whose positions and contents are asked for by number, into cells of side `cell`: see [`Grid::build`].
     pub fn build(count: usize, position: impl Fn(usize) -> Vec3 + Sync, item: impl Fn(usize) -> T + Sync, cell: f32) -> Self {
-        Self::build_ahead(count, position, |_| (), item, cell)
+        Self::build_in(Vec::new(), count, position, |_| (), item, cell)
     }
 
-    /// [`Store::build`], telling `ahead` of items before they are asked for: see [`Order::gather_ahead`](super::Order::gather_ahead).
-    pub fn build_ahead(
+    /// [`Store::build`] in the memory of an older one ([`Store::into_items`]), telling `ahead` of items before they are asked for: see
+    /// [`Order::gather_into`](super::Order::gather_into).
+    pub fn build_in(
+        mut items: Vec<T>,
         count: usize,
         position: impl Fn(usize) -> Vec3 + Sync,
         ahead: impl Fn(usize) + Sync,
@@ -41,7 +43,8 @@ impl<T: Send> Store<T> {
         cell: f32,
     ) -> Self {
         let (grid, order) = Grid::build(count, position, cell);
-        Self { grid, items: order.gather_ahead(ahead, item) }
+        order.gather_into(&mut items, ahead, item);
+        Self { grid, items }
     }
 }
 
@@ -49,6 +52,11 @@ impl<T> Store<T> {
     /// The grid of the positions.
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// The memory of the items, for the next store.
+    pub fn into_items(self) -> Vec<T> {
+        self.items
     }
 
     /// The items in the grid's order.

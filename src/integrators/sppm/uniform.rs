@@ -77,7 +77,8 @@ impl Sppm<'_> {
         }
         stats.light_paths += draw.traced;
         let cell = self.cell * shrink(i, self.settings.alpha) as f32;
-        (Store::build_ahead(photons.len(), |i| photons[i].0, |i| fetch(&photons[i].1), |i| photons[i].1, cell), draw.scales)
+        let ahead = |i: usize| fetch(&photons[i].1);
+        (Store::build_in(Vec::new(), photons.len(), |i| photons[i].0, ahead, |i| photons[i].1, cell), draw.scales)
     }
 
     /// Flux density around a measurement point, strata scaled, times throughput and BSDF. Counts the photons it takes.

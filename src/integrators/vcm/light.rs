@@ -319,8 +319,8 @@ pub(super) struct Merging {
 }
 
 impl Merging {
-    /// Sorts all vertices that may merge into cells of side `cell`.
-    pub(super) fn new(light: &LightSide, cell: f32) -> Self {
+    /// Sorts all vertices that may merge into cells of side `cell`; `memory` held those of an earlier iteration.
+    pub(super) fn new(light: &LightSide, cell: f32, memory: Vec<MergeVertex>) -> Self {
         let of_batch = |(number, batch): (usize, &Batch)| -> Vec<[u32; 2]> {
             let merge = batch.vertices.iter().enumerate().filter(|(_, vertex)| vertex.carried.share > 0.0);
             merge.map(|(i, _)| [number as u32, i as u32]).collect()
@@ -336,7 +336,7 @@ impl Merging {
         let positions: Vec<Vec3> = (0..places.len()).into_par_iter().with_min_len(1 << 12).map(|i| vertex(i).end.p).collect();
         let ahead = |i: usize| fetch(vertex(i));
         let item = |i: usize| MergeVertex::new(vertex(i), i as u32);
-        let store = Store::build_ahead(places.len(), |i| positions[i], ahead, item, cell);
+        let store = Store::build_in(memory, places.len(), |i| positions[i], ahead, item, cell);
         Self { store, letters }
     }
 
