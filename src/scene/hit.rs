@@ -101,7 +101,7 @@ pub struct Hit {
     /// Shading frame; `frame.n` is the shading normal and may lie on the other side of `end.n_g` than a given direction.
     /// `frame.s` follows the surface's `dp/du` where a material of the shape is anisotropic, else it is any tangent.
     pub frame: Frame,
-    /// Texture coordinates.
+    /// Texture coordinates; of a quadric zero, where no texture of the shape's material or light asks for them.
     pub uv: Vec2,
     /// The primitive hit, as the accelerator counts them.
     pub prim: u32,

@@ -21,8 +21,9 @@ use emitter::{Area, Ball, DirectSample, EmissionPdf, EmissionSample, Emitted, Em
 use glam::{Vec2, Vec3};
 use hit::{Endpoint, Hit};
 use ray::{RawHit, Ray};
-use shape::surface::{self, Surfaces};
+use shape::surface::{self, Asked, Owner, Surfaces};
 use shape::{Geometry, Shape};
+use texture::Texture;
 
 /// Number of a shape in its scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -155,8 +156,9 @@ impl Scene {
             let Shape { name, geometry, bsdf, radiance } = shape;
             let first = surfaces.len();
             let id = radiance.is_some().then_some(EmitterId(list.len() as u32));
-            let tangents = bsdfs[bsdf.0 as usize].anisotropic();
-            surfaces.push(&geometry, bsdf, id, tangents, &mut primitives);
+            let material = &bsdfs[bsdf.0 as usize];
+            let asked = Asked { tangents: material.anisotropic(), uv: material.varies() || radiance.as_ref().is_some_and(Texture::varies) };
+            surfaces.push(&geometry, Owner { bsdf, emitter: id, asked }, &mut primitives);
             list.extend(radiance.map(|r| Emitter::Area(Area::new(ShapeId(number as u32), r, first..surfaces.len(), &surfaces))));
             let primitives = first as u32..surfaces.len() as u32;
             infos.push(ShapeInfo { name, kind: geometry.kind(), primitives, bsdf, emitter: id });

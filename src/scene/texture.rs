@@ -36,6 +36,11 @@ impl Texture {
         Texture::Constant(Rgb::splat(value))
     }
 
+    /// Does the value depend on the texture coordinates?
+    pub fn varies(&self) -> bool {
+        !matches!(self, Texture::Constant(_))
+    }
+
     /// Value at texture coordinates `uv` (any real numbers).
     #[inline(always)]
     pub fn eval(&self, uv: Vec2) -> Rgb {

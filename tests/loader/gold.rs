@@ -1,13 +1,15 @@
 //! Scenes as Mitsuba reads them: the XML that its values were measured from, loaded here, gives the same values.
 
 use super::{SENSOR, load_files};
-use glam::{Vec2, Vec3};
+use glam::{Affine2, Vec2, Vec3};
 use isophote::math::Rgb;
 use isophote::scene::Scene;
+use isophote::scene::bsdf::diffuse::Diffuse;
 use isophote::scene::bsdf::{Bsdf, Lobes};
 use isophote::scene::emitter::EmitterKind;
 use isophote::scene::mitsuba::{LoadOptions, LoadedParts};
 use isophote::scene::ray::Ray;
+use isophote::scene::texture::{Checkerboard, Texture};
 use serde_json::Value;
 
 fn entries(file: &str, list: &str) -> Vec<Value> {
@@ -151,7 +153,11 @@ fn cameras_send_mitsubas_rays() {
 fn shapes_are_hit_where_mitsuba_hits_them() {
     let mut report = Report::new(2e-4);
     for entry in entries("shape_values.json", "shapes") {
-        let scene = build(text(&entry, "xml"));
+        // A material that varies, so that texture coordinates are found.
+        let mut parts = load(text(&entry, "xml")).parts;
+        let board = Checkerboard { color0: Texture::grey(0.2), color1: Texture::grey(0.4), to_uv: Affine2::IDENTITY };
+        parts.bsdfs.fill(Bsdf::Diffuse(Diffuse { reflectance: Texture::Checkerboard(Box::new(board)) }));
+        let scene = Scene::build(parts).unwrap();
         for ray in list(&entry, "rays") {
             let what = format!("{} from {}", text(&entry, "name"), ray["o"]);
             let hit = scene.intersect(&Ray::new(vec3(&ray["o"]), vec3(&ray["d"])));

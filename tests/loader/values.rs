@@ -3,11 +3,13 @@
 use super::{load, load_files, scene};
 use glam::{Affine3A, Vec2, Vec3};
 use isophote::math::Rgb;
+use isophote::scene::Scene;
 use isophote::scene::bsdf::microfacet::{Microfacet, MicrofacetKind, NormalSampling};
 use isophote::scene::bsdf::plastic::Plastic;
 use isophote::scene::bsdf::roughplastic::RoughPlastic;
 use isophote::scene::bsdf::{Bsdf, Lobes};
 use isophote::scene::mitsuba::LoadOptions;
+use isophote::scene::ray::Ray;
 use isophote::scene::shape::{Geometry, Mesh};
 use isophote::scene::texture::Texture;
 
@@ -356,4 +358,52 @@ fn checkerboard() {
     let m = c.to_uv.matrix2;
     assert!(m.x_axis.abs_diff_eq(Vec2::new(1.732_05, 1.0), 1e-4) && m.y_axis.abs_diff_eq(Vec2::new(-1.5, 2.598_08), 1e-4), "{:?}", c.to_uv);
     assert!(c.to_uv.translation.abs_diff_eq(Vec2::new(0.5, 0.0), 1e-5));
+}
+
+/// A quadric's hits have texture coordinates where the shape's material or light has a texture in any place, and only there.
+#[test]
+fn coordinates_are_found_where_a_texture_asks() {
+    let materials: [(&str, &str, &[&str]); 12] = [
+        ("diffuse", "", &["reflectance"]),
+        ("dielectric", "", &["specular_reflectance", "specular_transmittance"]),
+        ("thindielectric", "", &["specular_reflectance", "specular_transmittance"]),
+        ("roughdielectric", "", &["specular_reflectance", "specular_transmittance"]),
+        ("conductor", "", &["specular_reflectance"]),
+        ("roughconductor", "", &["specular_reflectance"]),
+        ("plastic", "", &["diffuse_reflectance", "specular_reflectance"]),
+        ("roughplastic", "", &["diffuse_reflectance", "specular_reflectance"]),
+        ("phong", "", &["diffuse_reflectance", "specular_reflectance"]),
+        ("mask", "<bsdf type=\"diffuse\"/>", &["opacity"]),
+        ("blendbsdf", "<bsdf type=\"diffuse\"/><bsdf type=\"conductor\"/>", &["weight"]),
+        ("twosided", "", &[]),
+    ];
+    let board = |name: &str| format!("<texture type=\"checkerboard\" name=\"{name}\"/>");
+    let textured = format!("<bsdf type=\"diffuse\">{}</bsdf>", board("reflectance"));
+    let plain = "<bsdf type=\"diffuse\"/>";
+    // Plain ones first.
+    let mut cases: Vec<(bool, String)> = Vec::new();
+    for (name, nested, parameters) in materials {
+        let nested = if name == "twosided" { plain } else { nested };
+        let numbers = if name == "blendbsdf" { "<float name=\"weight\" value=\"0.3\"/>" } else { "" };
+        cases.push((false, format!("<bsdf type=\"{name}\">{nested}{numbers}</bsdf>")));
+        cases.extend(parameters.iter().map(|parameter| (true, format!("<bsdf type=\"{name}\">{nested}{}</bsdf>", board(parameter)))));
+    }
+    let within = |outside: &str, inside: &str| format!("<bsdf type=\"{outside}\">{inside}</bsdf>");
+    let weight = "<float name=\"weight\" value=\"0.3\"/>";
+    cases.extend([
+        (true, within("mask", &textured)),
+        (true, within("twosided", &textured)),
+        (true, within("twosided", &format!("{plain}{textured}"))),
+        (true, within("blendbsdf", &format!("{weight}{plain}{textured}"))),
+        (true, within("blendbsdf", &format!("{weight}{textured}{plain}"))),
+        (false, "<emitter type=\"area\"/>".to_owned()),
+        (true, format!("<emitter type=\"area\">{}</emitter>", board("radiance"))),
+    ]);
+    for (asked, case) in cases {
+        for shape in ["sphere", "cylinder"] {
+            let scene = Scene::build(load(&format!("<shape type=\"{shape}\">{case}</shape>")).parts).unwrap();
+            let ray = Ray::new(Vec3::new(3.0, 0.2, 0.3), Vec3::NEG_X);
+            assert_eq!(scene.intersect(&ray).unwrap().uv != Vec2::ZERO, asked, "{shape}: {case}");
+        }
+    }
 }

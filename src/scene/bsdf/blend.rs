@@ -112,4 +112,8 @@ impl Blend {
     pub(super) fn transmissive(&self) -> bool {
         self.first.transmissive() || self.second.transmissive()
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.weight.varies() || self.first.varies() || self.second.varies()
+    }
 }

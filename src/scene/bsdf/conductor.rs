@@ -44,4 +44,8 @@ impl Conductor {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.specular_reflectance.varies()
+    }
 }

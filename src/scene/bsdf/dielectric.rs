@@ -68,4 +68,8 @@ impl Dielectric {
     pub(super) fn transmissive(&self) -> bool {
         true
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.specular_reflectance.varies() || self.specular_transmittance.varies()
+    }
 }

@@ -75,4 +75,8 @@ impl Diffuse {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.reflectance.varies()
+    }
 }

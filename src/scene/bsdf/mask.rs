@@ -90,4 +90,8 @@ impl Mask {
     pub(super) fn transmissive(&self) -> bool {
         true
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.opacity.varies() || self.nested.varies()
+    }
 }

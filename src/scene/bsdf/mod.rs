@@ -429,6 +429,11 @@ impl Bsdf {
     pub fn transmissive(&self) -> bool {
         dispatch!(self, b => b.transmissive())
     }
+
+    /// Does any answer depend on the texture coordinates?
+    pub fn varies(&self) -> bool {
+        dispatch!(self, b => b.varies())
+    }
 }
 
 mod beckmann;

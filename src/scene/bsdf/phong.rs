@@ -151,4 +151,8 @@ impl Phong {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.diffuse_reflectance.varies() || self.specular_reflectance.varies()
+    }
 }

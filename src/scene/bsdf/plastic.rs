@@ -159,4 +159,8 @@ impl Plastic {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.diffuse_reflectance.varies() || self.specular_reflectance.varies()
+    }
 }

@@ -117,4 +117,8 @@ impl RoughConductor {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.specular_reflectance.varies()
+    }
 }

@@ -207,4 +207,8 @@ impl RoughDielectric {
     pub(super) fn transmissive(&self) -> bool {
         true
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.specular_reflectance.varies() || self.specular_transmittance.varies()
+    }
 }

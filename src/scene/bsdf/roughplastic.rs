@@ -203,4 +203,8 @@ impl RoughPlastic {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.diffuse_reflectance.varies() || self.specular_reflectance.varies()
+    }
 }

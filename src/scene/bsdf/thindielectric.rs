@@ -63,4 +63,8 @@ impl ThinDielectric {
     pub(super) fn transmissive(&self) -> bool {
         true
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.specular_reflectance.varies() || self.specular_transmittance.varies()
+    }
 }

@@ -82,4 +82,8 @@ impl TwoSided {
     pub(super) fn transmissive(&self) -> bool {
         false
     }
+
+    pub(super) fn varies(&self) -> bool {
+        self.front.varies() || self.back.as_ref().is_some_and(|b| b.varies())
+    }
 }

@@ -1,7 +1,7 @@
 //! Spheres, disks and cylinders as described: a map from a unit shape.
 
 use super::ShapeError;
-use super::surface::SurfacePoint;
+use super::surface::{Asked, SurfacePoint};
 use crate::math::elementary::turns;
 use crate::math::{Frame, warp};
 use crate::scene::accel::Primitive;
@@ -193,17 +193,27 @@ impl Quadric {
         }
     }
 
-    /// The surface at the point nearest to `near`, which is on it up to rounding.
-    pub(super) fn surface(&self, near: DVec3, tangents: bool) -> (SurfacePoint, Frame) {
-        let local = self.to_object.transform_point3(near);
-        let local = match self.kind {
-            Kind::Sphere { .. } => local.normalize_or(DVec3::Z),
-            Kind::Disk => local.with_z(0.0),
-            Kind::Cylinder => local.truncate().normalize_or(glam::DVec2::X).extend(local.z),
+    /// The surface at the point nearest to `near`, which is on it up to rounding, with what is asked.
+    pub(super) fn surface(&self, near: DVec3, asked: Asked) -> (SurfacePoint, Frame) {
+        let (end, local) = match self.kind {
+            Kind::Sphere { center, radius } => {
+                let outward = (near - center).normalize_or(DVec3::Z);
+                let local = if asked.tangents || asked.uv { self.in_object_space(outward) } else { outward };
+                (self.on_sphere(center, radius, outward), local)
+            }
+            Kind::Disk => {
+                let local = self.to_object.transform_point3(near).with_z(0.0);
+                (self.at(local), local)
+            }
+            Kind::Cylinder => {
+                let local = self.to_object.transform_point3(near);
+                let local = local.truncate().normalize_or(glam::DVec2::X).extend(local.z);
+                (self.at(local), local)
+            }
         };
-        let point = self.at(local);
-        let frame = if tangents { Frame::from_normal_and_tangent(point.n_s, self.dp_du(local)) } else { Frame::from_normal(point.n_s) };
-        (point, frame)
+        let n = end.n_g;
+        let frame = if asked.tangents { Frame::from_normal_and_tangent(n, self.dp_du(local)) } else { Frame::from_normal(n) };
+        (SurfacePoint { end, n_s: n, uv: if asked.uv { self.uv(local) } else { Vec2::ZERO } }, frame)
     }
 
     /// A point, uniform by area.
@@ -221,7 +231,8 @@ impl Quadric {
                 DVec3::new(cos, sin, f64::from(u.y))
             }
         };
-        self.at(local)
+        let end = self.at(local);
+        SurfacePoint { end, n_s: end.n_g, uv: self.uv(local) }
     }
 
     /// The point of an outward sphere in this unit direction from its centre; `None` for any other shape.
@@ -233,16 +244,31 @@ impl Quadric {
 
     /// Texture coordinates of a sphere there.
     pub(in crate::scene) fn uv_in_direction(&self, outward: DVec3) -> Vec2 {
-        self.uv(self.to_object.transform_vector3(outward).normalize_or(DVec3::Z))
+        self.uv(self.in_object_space(outward))
+    }
+
+    /// The direction from a sphere's centre as its object space has it.
+    fn in_object_space(&self, outward: DVec3) -> DVec3 {
+        self.to_object.transform_vector3(outward).normalize_or(DVec3::Z)
+    }
+
+    /// The point of a sphere in this unit direction from its centre.
+    fn on_sphere(&self, center: DVec3, radius: f64, outward: DVec3) -> Endpoint {
+        endpoint(center + outward * radius, self.facing(outward))
+    }
+
+    /// The normal to an outward (upward) one.
+    fn facing(&self, outward: DVec3) -> Vec3 {
+        if self.flipped { -outward } else { outward }.as_vec3()
     }
 
     /// The point at a position of the unit shape.
-    fn at(&self, local: DVec3) -> SurfacePoint {
+    fn at(&self, local: DVec3) -> Endpoint {
         let m = self.to_world.matrix3;
         let (p, n) = match self.kind {
             Kind::Sphere { center, radius } => {
-                let n = self.to_world.transform_vector3(local).normalize_or(DVec3::Z);
-                (center + n * radius, n)
+                let outward = self.to_world.transform_vector3(local).normalize_or(DVec3::Z);
+                return self.on_sphere(center, radius, outward);
             }
             Kind::Disk => {
                 // Upward under the inverse transpose: a mirroring map does not turn it, as in Mitsuba.
@@ -254,8 +280,7 @@ impl Quadric {
                 (self.to_world.transform_point3(local), outward.normalize_or(DVec3::Z))
             }
         };
-        let n = if self.flipped { -n } else { n }.as_vec3();
-        SurfacePoint { end: endpoint(p, n), n_s: n, uv: self.uv(local) }
+        endpoint(p, self.facing(n))
     }
 
     /// Texture coordinates at a position of the unit shape, as Mitsuba has them.

@@ -57,11 +57,19 @@ const BARYCENTRIC: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::Y];
 
 /// What a hit asks of its shape.
 #[derive(Clone, Copy, Debug)]
-struct Owner {
-    bsdf: BsdfId,
-    emitter: Option<EmitterId>,
-    /// The material wants tangents.
-    tangents: bool,
+pub(in crate::scene) struct Owner {
+    pub(in crate::scene) bsdf: BsdfId,
+    pub(in crate::scene) emitter: Option<EmitterId>,
+    pub(in crate::scene) asked: Asked,
+}
+
+/// What a shape's material and light ask of a hit beside its position and normals.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::scene) struct Asked {
+    /// The frame's tangent follows `dp/du`.
+    pub(in crate::scene) tangents: bool,
+    /// Texture coordinates.
+    pub(in crate::scene) uv: bool,
 }
 
 /// A point chosen on a surface.
@@ -84,16 +92,9 @@ pub(in crate::scene) struct Surfaces {
 
 impl Surfaces {
     /// Adds a shape's primitives, here and to the accelerator's list.
-    pub(in crate::scene) fn push(
-        &mut self,
-        geometry: &Geometry,
-        bsdf: BsdfId,
-        emitter: Option<EmitterId>,
-        tangents: bool,
-        primitives: &mut Vec<Primitive>,
-    ) {
+    pub(in crate::scene) fn push(&mut self, geometry: &Geometry, owner: Owner, primitives: &mut Vec<Primitive>) {
         let shape = self.owners.len() as u32;
-        self.owners.push(Owner { bsdf, emitter, tangents });
+        self.owners.push(owner);
         let quadric = match geometry {
             Geometry::Mesh(mesh) => {
                 self.records.reserve(mesh.triangles.len());
@@ -174,11 +175,12 @@ impl Surfaces {
         let (point, frame) = if record.detail & KIND == QUADRIC {
             // Part by part, so that triangles' hits need not go through the memory that this call writes to.
             let (SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv }, Frame { s, t, n }) =
-                self.on_quadric(record, ray, raw.t, owner.tangents);
+                self.on_quadric(record, ray, raw.t, owner.asked);
             (SurfacePoint { end: Endpoint { p, n_g, offset }, n_s, uv }, Frame { s, t, n })
         } else {
             let point = self.point(record, raw.u, raw.v);
-            let Frame { s, t, n } = if owner.tangents { self.tangent_frame(record, point.n_s) } else { Frame::from_normal(point.n_s) };
+            let Frame { s, t, n } =
+                if owner.asked.tangents { self.tangent_frame(record, point.n_s) } else { Frame::from_normal(point.n_s) };
             let frame = Frame { s, t, n };
             (point, frame)
         };
@@ -193,8 +195,8 @@ impl Surfaces {
 
     /// The surface of a quadric where a ray met it.
     #[inline(never)]
-    fn on_quadric(&self, record: &Record, ray: &Ray, t: f32, tangents: bool) -> (SurfacePoint, Frame) {
-        self.quadrics[(record.detail & !KIND) as usize].surface(ray.o.as_dvec3() + f64::from(t) * ray.d.as_dvec3(), tangents)
+    fn on_quadric(&self, record: &Record, ray: &Ray, t: f32, asked: Asked) -> (SurfacePoint, Frame) {
+        self.quadrics[(record.detail & !KIND) as usize].surface(ray.o.as_dvec3() + f64::from(t) * ray.d.as_dvec3(), asked)
     }
 
     /// The point of a triangle with these weights of the second and third corner.

@@ -1,12 +1,13 @@
 //! Against the values in `tests/oracle`, dumped from Mitsuba 3.9.1.
 
 use super::gold_xml;
-use super::kit::{apart, scene, stream};
+use super::kit::{apart, scene, scene_with_lights, stream};
 use crate::math::Rgb;
 use crate::samplers::Stream;
 use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::scene::ray::Ray;
-use glam::{Vec2, Vec3};
+use crate::scene::texture::{Checkerboard, Texture};
+use glam::{Affine2, Vec2, Vec3};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -71,7 +72,10 @@ fn shapes_are_where_mitsuba_has_them() {
         let Some((geometry, _)) = gold_xml::shape(entry["xml"].as_str().unwrap()) else {
             continue;
         };
-        let scene = scene(vec![(geometry, Some(Rgb::WHITE))], Vec::new());
+        // A light that varies, so that texture coordinates are found.
+        let (color0, color1, to_uv) = (Texture::grey(1.0), Texture::grey(2.0), Affine2::IDENTITY);
+        let board = Texture::Checkerboard(Box::new(Checkerboard { color0, color1, to_uv }));
+        let scene = scene_with_lights(vec![(geometry, Some(board))], Vec::new());
         let Emitter::Area(light) = &scene.emitters()[0] else { panic!("no light") };
         assert!((light.area() / f(&entry["area"]) - 1.0).abs() < 1e-6, "{name}: area {} {}", light.area(), entry["area"]);
         for ray in list(&entry["rays"]) {
@@ -99,7 +103,7 @@ fn shapes_are_where_mitsuba_has_them() {
 fn tangents_follow_mitsubas_texture_coordinates() {
     use crate::scene::BsdfId;
     use crate::scene::accel::{Accel, Bvh};
-    use crate::scene::shape::surface::Surfaces;
+    use crate::scene::shape::surface::{Asked, Owner, Surfaces};
     let values = gold("shape_values.json");
     for entry in list(&values["shapes"]) {
         let name = entry["name"].as_str().unwrap();
@@ -107,7 +111,8 @@ fn tangents_follow_mitsubas_texture_coordinates() {
             continue;
         };
         let (mut surfaces, mut primitives) = (Surfaces::default(), Vec::new());
-        surfaces.push(&geometry, BsdfId(0), None, true, &mut primitives);
+        let owner = Owner { bsdf: BsdfId(0), emitter: None, asked: Asked { tangents: true, uv: true } };
+        surfaces.push(&geometry, owner, &mut primitives);
         let tree = Bvh::build(&primitives);
         for entry in list(&entry["rays"]).iter().filter(|e| e["hit"] == true) {
             let ray = Ray::new(vec3(&entry["o"]), vec3(&entry["d"]));

@@ -23,11 +23,16 @@ pub(super) fn pair(stream: &mut UniformStream) -> Vec2 {
 
 /// A scene of these shapes, shining or not, and emitters.
 pub(super) fn scene(shapes: Vec<(Geometry, Option<Rgb>)>, emitters: Vec<Emitter>) -> Scene {
-    let shape = |(i, (geometry, radiance)): (usize, (Geometry, Option<Rgb>))| Shape {
+    scene_with_lights(shapes.into_iter().map(|(geometry, radiance)| (geometry, radiance.map(Texture::Constant))).collect(), emitters)
+}
+
+/// [`scene`] of shapes whose radiance may vary.
+pub(super) fn scene_with_lights(shapes: Vec<(Geometry, Option<Texture>)>, emitters: Vec<Emitter>) -> Scene {
+    let shape = |(i, (geometry, radiance)): (usize, (Geometry, Option<Texture>))| Shape {
         name: format!("shape {i}"),
         geometry,
         bsdf: BsdfId(0),
-        radiance: radiance.map(Texture::Constant),
+        radiance,
     };
     Scene::build(SceneParts {
         shapes: shapes.into_iter().enumerate().map(shape).collect(),
