@@ -94,9 +94,10 @@ pub struct Search {
 }
 
 impl Grid {
-    /// Side of the cells for queries of radius `radius`: a query touches two cells an axis, or three with the probability 0.
+    /// Side of the cells for queries of radius `radius`: a query touches one or two cells an axis, or three with the probability 0. Narrower
+    /// cells mean more runs; wider ones more positions, which tells where a query finds a hundred.
     pub fn cell_for(radius: f32) -> f32 {
-        2.0 * radius
+        3.0 * radius
     }
 
     /// Sorts `count` positions (at most 2^32 - 1) into cells of side `cell` (world units, positive). The order, and so that in which queries
