@@ -49,6 +49,11 @@ impl Order {
             }
             item(i as usize)
         };
+        if gathered.capacity() < self.len() {
+            // What grows is doubled. The next ones are about as many; room that none of them takes costs nothing.
+            *gathered = Vec::new();
+            gathered.reserve_exact(self.len() + self.len() / 16);
+        }
         self.0.par_iter().with_min_len(1 << 12).enumerate().map(one).collect_into_vec(gathered);
     }
 }

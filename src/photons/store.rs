@@ -27,12 +27,8 @@ pub struct Store<T> {
 }
 
 impl<T: Send> Store<T> {
-    /// Sorts `count` items, whose positions and contents are asked for by number, into cells of side `cell`: see [`Grid::build`].
-    pub fn build(count: usize, position: impl Fn(usize) -> Vec3 + Sync, item: impl Fn(usize) -> T + Sync, cell: f32) -> Self {
-        Self::build_in(Vec::new(), count, position, |_| (), item, cell)
-    }
-
-    /// [`Store::build`] in the memory of an older one ([`Store::into_items`]), telling `ahead` of items before they are asked for: see
+    /// Sorts `count` items, whose positions and contents are asked for by number, into cells of side `cell`: see [`Grid::build`]. `items` is the
+    /// memory of an older store ([`Store::into_items`]) or nothing; `ahead` is told of items before they are asked for: see
     /// [`Order::gather_into`](super::Order::gather_into).
     pub fn build_in(
         mut items: Vec<T>,
