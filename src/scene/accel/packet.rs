@@ -267,6 +267,19 @@ trait Found<const K: usize>: Sized {
     fn analytic(self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self;
 }
 
+impl Bests {
+    /// [`Best::improve`] for the rays of the mask, whose `t` is at most the best one's: of equally near hits the lower number wins.
+    #[inline(always)]
+    fn improve(&mut self, hit: f32x8, [t, u, v]: [f32x8; 3], prim: u32) {
+        let prim = u32x8::splat(prim);
+        let better = hit & (t.simd_lt(self.t) | f32x8::from_bits(prim.simd_lt(self.prim)));
+        self.t = better.select(t, self.t);
+        self.u = better.select(u, self.u);
+        self.v = better.select(v, self.v);
+        self.prim = better.to_bits().select(prim, self.prim);
+    }
+}
+
 impl<const K: usize> Found<K> for Bests {
     #[inline(always)]
     fn until(&self) -> f32x8 {
@@ -277,13 +290,7 @@ impl<const K: usize> Found<K> for Bests {
     fn leaf(&mut self, p: &Packet<K>, active: f32x8, leaf: Tri8<'_>) {
         for n in 0..leaf.count() {
             if let Some((hit, [t, u, v])) = p.hits(leaf, n, active, self.t) {
-                let prim = u32x8::splat(leaf.number(n));
-                // `hit` says `t <= self.t`: of equally near hits the lower number wins.
-                let better = hit & (t.simd_lt(self.t) | f32x8::from_bits(prim.simd_lt(self.prim)));
-                self.t = better.select(t, self.t);
-                self.u = better.select(u, self.u);
-                self.v = better.select(v, self.v);
-                self.prim = better.to_bits().select(prim, self.prim);
+                self.improve(hit, [t, u, v], leaf.number(n));
             }
         }
     }
@@ -292,12 +299,7 @@ impl<const K: usize> Found<K> for Bests {
     fn analytic(mut self, p: &Packet<K>, active: f32x8, shape: &Analytic) -> Self {
         if let Shape::Sphere { center, radius2 } = shape.shape {
             if let Some((hit, t)) = p.hits_sphere(center, radius2, active, self.t) {
-                let prim = u32x8::splat(shape.prim);
-                let better = hit & (t.simd_lt(self.t) | f32x8::from_bits(prim.simd_lt(self.prim)));
-                self.t = better.select(t, self.t);
-                self.u = better.select(f32x8::ZERO, self.u);
-                self.v = better.select(f32x8::ZERO, self.v);
-                self.prim = better.to_bits().select(prim, self.prim);
+                self.improve(hit, [t, f32x8::ZERO, f32x8::ZERO], shape.prim);
             }
             return self;
         }

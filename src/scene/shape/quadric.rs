@@ -239,7 +239,7 @@ impl Quadric {
     #[inline]
     pub(in crate::scene) fn in_direction(&self, outward: DVec3) -> Option<Endpoint> {
         let (center, radius) = self.outward_sphere()?;
-        Some(endpoint(center + outward * radius, outward.as_vec3()))
+        Some(self.on_sphere(center, radius, outward))
     }
 
     /// Texture coordinates of a sphere there.
